@@ -1,0 +1,1 @@
+"""The pure core: geometry, kinematics, tasks, limits and laws. No I/O, no clock, no threads."""

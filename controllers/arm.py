@@ -1,0 +1,115 @@
+"""Arm and Section: the frozen geometry and limits that everything else is sized by.
+
+Arrays of chamber quantities have the shape ``(n_sections, 3)``; SI units throughout.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.errors import InvalidInput
+
+Array = NDArray[np.float64]
+
+#: Base angles of the three chambers around the backbone, rad.
+CHAMBER_ANGLES_RAD = np.deg2rad([0.0, 120.0, 240.0])
+CHAMBER_ANGLES_RAD.setflags(write=False)
+
+#: Eq. (4) is an open interval: a command stays this far (m) inside its ends.
+LENGTH_MARGIN_M = 1e-6
+
+
+@dataclass(frozen=True)
+class Section:
+    """One section: three chambers parallel to the backbone between two rigid plates.
+
+    ``lengthening_m_per_pa`` and ``softening_m_per_pa2`` are the two coefficients of the
+    pressure-to-length map, see :mod:`controllers.actuation`.
+    """
+
+    rest_length_m: float
+    chamber_offset_m: float
+    length_min_m: float
+    length_max_m: float
+    bend_max_rad: float
+    length_rate_max_m_s: float
+    pressure_min_pa: float
+    pressure_max_pa: float
+    pressure_slew_max_pa_s: float
+    lengthening_m_per_pa: float
+    softening_m_per_pa2: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise InvalidInput where two bounds contradict each other."""
+        _ordered("length_min_m", self.length_min_m, "rest_length_m", self.rest_length_m)
+        _ordered("rest_length_m", self.rest_length_m, "length_max_m", self.length_max_m)
+        _ordered("pressure_min_pa", self.pressure_min_pa, "pressure_max_pa", self.pressure_max_pa)
+        if self.pressure_min_pa > 0.0 or self.pressure_max_pa < 0.0:
+            raise InvalidInput(
+                f"pressure_min_pa = {self.pressure_min_pa:g}, pressure_max_pa = "
+                f"{self.pressure_max_pa:g}: zero (ambient, the vented arm) must lie between them"
+            )
+
+
+def _ordered(low_name: str, low: float, high_name: str, high: float) -> None:
+    if not low < high:
+        raise InvalidInput(f"{low_name} = {low:g} must be less than {high_name} = {high:g}")
+
+
+def _frozen(values: object) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A named list of sections, base first, and how gravity acts on it.
+
+    ``gravity_m_s2`` is the acceleration of gravity in the base frame (z from base to tip of the
+    straight arm): ``(0, 0, 9.81)`` is an arm that hangs.
+    """
+
+    name: str
+    sections: tuple[Section, ...]
+    gravity_m_s2: tuple[float, float, float] = (0.0, 0.0, 9.81)
+
+    def __post_init__(self) -> None:
+        """Raise InvalidInput for an arm without sections."""
+        if not self.sections:
+            raise InvalidInput(f"arm {self.name!r} has no sections; at least one is needed")
+
+    @property
+    def n_sections(self) -> int:
+        """Number of sections."""
+        return len(self.sections)
+
+    @property
+    def n_chambers(self) -> int:
+        """Number of chambers, three a section."""
+        return 3 * len(self.sections)
+
+    def per_section(self, field: str) -> Array:
+        """Return a Section field as a read-only array of shape ``(n_sections, 1)``."""
+        return _frozen([[getattr(section, field)] for section in self.sections])
+
+    def per_chamber(self, field: str) -> Array:
+        """Return a Section field as a read-only array of shape ``(n_sections, 3)``."""
+        return _frozen(np.repeat(self.per_section(field), 3, axis=1))
+
+    @cached_property
+    def rest_lengths_m(self) -> Array:
+        """Chamber lengths of the vented arm without load, ``(n_sections, 3)``."""
+        return self.per_chamber("rest_length_m")
+
+    @cached_property
+    def total_rest_length_m(self) -> float:
+        """Backbone length of the vented arm without load."""
+        return float(sum(section.rest_length_m for section in self.sections))
+
+    @cached_property
+    def max_length_m(self) -> float:
+        """Backbone length with every chamber at its upper bound."""
+        return float(sum(section.length_max_m for section in self.sections))

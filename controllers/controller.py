@@ -1,0 +1,175 @@
+"""The controller: a target in, lengths and pressures out, once a tick."""
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+import numpy as np
+
+from controllers.actuation import PressureMap, pressure_length_bounds_m
+from controllers.arm import LENGTH_MARGIN_M, Arm, Array
+from controllers.kinematics.compiled import CompiledKinematics, TipState
+from controllers.law import AT_BOUND_M, Law, Limits
+from controllers.qp_ik import QpIk
+from controllers.resolved_rate import ResolvedRate
+from controllers.targets import (
+    LawName,
+    LengthsTarget,
+    PoseTarget,
+    PositionTarget,
+    PressuresTarget,
+    Target,
+    TwistTarget,
+)
+from controllers.tasks.chamber_lengths import ChamberLengths
+from controllers.tasks.task import Task
+from controllers.tasks.tip_pose import TipPose, rotation_from_quaternion
+from controllers.tasks.tip_position import TipPosition
+from controllers.tasks.tip_twist import TipTwist
+
+
+class Reach(IntEnum):
+    """How the commanded arm stands to its target, numbered as on the wire."""
+
+    NONE = 0
+    MOVING = 1
+    REACHED = 2
+    OUT_OF_REACH = 3
+
+
+class Binding(IntFlag):
+    """Which limits stop the commanded arm, as bits on the wire."""
+
+    NOTHING = 0
+    LENGTH = 1
+    BEND = 2
+    PRESSURE = 4
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """Gains and tolerances of the laws."""
+
+    default_law: LawName = LawName.QP_IK
+    gain_per_s: float = 30.0
+    tip_speed_max_m_s: float = 0.3
+    reached_tolerance_m: float = 5e-4
+    stalled_rate_m_s: float = 5e-4
+    stalled_time_s: float = 0.2
+
+
+class Controller:
+    """Holds the commanded lengths and moves them toward the target, inside every limit."""
+
+    def __init__(self, arm: Arm, settings: ControlSettings) -> None:
+        self.settings = settings
+        self.lengths_m = arm.rest_lengths_m.copy()
+        self.fallbacks = 0
+        self.reach = Reach.NONE
+        self.error_m = 0.0
+        self._limits = Limits(arm)
+        self._pressure_map = PressureMap(arm)
+        self._kinematics = CompiledKinematics(arm)
+        self._laws: dict[LawName, Law] = {
+            LawName.RESOLVED_RATE: ResolvedRate(self._limits),
+            LawName.QP_IK: QpIk(arm, self._limits),
+        }
+        low, high = pressure_length_bounds_m(arm)
+        self._pressure_is_tighter = (
+            low > arm.per_chamber("length_min_m") + LENGTH_MARGIN_M,
+            high < arm.per_chamber("length_max_m") - LENGTH_MARGIN_M,
+        )
+        self._task: Task | None = None
+        self._law = self._laws[settings.default_law]
+        self.law_name = settings.default_law
+        self._stalled_s = 0.0
+
+    def start_from(self, pressures_pa: Array) -> None:
+        """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
+        self.lengths_m = self._limits.clip(self._pressure_map.lengths_m(pressures_pa))
+        self.set_target(None)
+
+    def set_target(self, target: Target | None) -> None:
+        """Follow a new target from where the command stands now; None holds."""
+        self._task = None if target is None else self._task_of(target)
+        if target is None:
+            self.reach, self.error_m, self._stalled_s = Reach.NONE, 0.0, 0.0
+            return
+        self.law_name = self._law_name(target)
+        self._law = self._laws[self.law_name]
+
+    def _law_name(self, target: Target) -> LawName:
+        if target.law != LawName.DEFAULT:
+            return target.law
+        if isinstance(target, TwistTarget):
+            return LawName.RESOLVED_RATE
+        return self.settings.default_law
+
+    def _task_of(self, target: Target) -> Task:
+        gain, speed = self.settings.gain_per_s, self.settings.tip_speed_max_m_s
+        match target:
+            case PositionTarget():
+                return TipPosition(target.position_m, gain, speed)
+            case PoseTarget():
+                rotation = rotation_from_quaternion(target.quaternion_xyzw)
+                return TipPose(target.position_m, rotation, gain, speed)
+            case TwistTarget():
+                return TipTwist(
+                    target.linear_m_s,
+                    target.angular_rad_s,
+                    target.in_tip_frame,
+                    target.about_base_origin,
+                )
+            case LengthsTarget():
+                return ChamberLengths(target.lengths_m, gain)
+            case PressuresTarget():
+                lengths = self._pressure_map.lengths_m(target.pressures_pa)
+                return ChamberLengths(self._limits.length.clip(lengths), gain)
+
+    def step(self, dt_s: float) -> TipState:
+        """Move the commanded lengths by one tick; return the tip they stand for.
+
+        The result's arrays are reused by the next call.
+        """
+        tip = self._kinematics.evaluate(self.lengths_m)
+        if self._task is None:
+            return tip
+        step = self._law.step(self._task, tip, self.lengths_m, dt_s)
+        self.fallbacks += step.fell_back
+        moved = float(np.abs(step.lengths_m - self.lengths_m).max())
+        self.lengths_m = step.lengths_m
+        tip = self._kinematics.evaluate(self.lengths_m)
+        self._judge(tip, moved, dt_s)
+        return tip
+
+    def pressures_pa(self) -> Array:
+        """Gauge pressures (n_sections, 3) of the commanded lengths."""
+        return self._pressure_map.pressures_pa(self.lengths_m)
+
+    def _judge(self, tip: TipState, moved_m: float, dt_s: float) -> None:
+        """Say whether the target is reached, being reached, or out of reach."""
+        if self._task is None:
+            return
+        self.error_m = self._task.error_m(tip, self.lengths_m)
+        if isinstance(self._task, TipTwist):
+            self.reach = Reach.MOVING
+        elif self.error_m <= self.settings.reached_tolerance_m:
+            self.reach = Reach.REACHED
+        else:
+            still = moved_m < self.settings.stalled_rate_m_s * dt_s
+            self._stalled_s = self._stalled_s + dt_s if still else 0.0
+            stalled = self._stalled_s >= self.settings.stalled_time_s
+            self.reach = Reach.OUT_OF_REACH if stalled else Reach.MOVING
+
+    def binding(self) -> Binding:
+        """Return the limits that the commanded lengths touch."""
+        binding = Binding.NOTHING
+        low = self.lengths_m - self._limits.length.lower_m < AT_BOUND_M
+        high = self._limits.length.upper_m - self.lengths_m < AT_BOUND_M
+        by_pressure = (low & self._pressure_is_tighter[0]) | (high & self._pressure_is_tighter[1])
+        if by_pressure.any():
+            binding |= Binding.PRESSURE
+        if ((low | high) & ~by_pressure).any():
+            binding |= Binding.LENGTH
+        if (self._limits.bend.slack_m(self.lengths_m) < AT_BOUND_M).any():
+            binding |= Binding.BEND
+        return binding

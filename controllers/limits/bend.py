@@ -1,0 +1,54 @@
+"""How far a section may bend."""
+
+import numpy as np
+
+from controllers.arm import Arm, Array
+from controllers.kinematics.constant_curvature import lengths_from_shapes, shapes_from_lengths
+
+
+class BendLimit:
+    """Keeps the bending angle of every section within ``bend_max_rad``.
+
+    The limit is a cone around the straight arm. Its rows are the tangent in the present direction
+    of bending, which a step along the cone leaves at second order: :meth:`clip` is exact.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self.bend_max_rad = arm.per_section("bend_max_rad").reshape(-1)
+        self._offset_m = arm.per_section("chamber_offset_m")
+        self.pattern = np.kron(np.eye(arm.n_sections), np.ones((1, 3)))
+        # d times the derivative of (u, v) over a section's three lengths: the rows are in metres.
+        self._gradient = shapes_from_lengths(np.eye(3), 1.0)[:, 1:].T
+        self._lower = np.full(arm.n_sections, -np.inf)
+
+    def rows(self, lengths_m: Array, dt_s: float) -> tuple[Array, Array, Array]:
+        """One row a section: how fast the bend grows, at most what is left, both times d (m)."""
+        bends = shapes_from_lengths(lengths_m, self._offset_m)[:, 1:]
+        theta = np.sqrt((bends * bends).sum(axis=1))
+        straight = theta < 1e-9
+        directions = np.where(
+            straight[:, None], (1.0, 0.0), bends / np.where(straight, 1.0, theta)[:, None]
+        )
+        rows = self.pattern * (directions @ self._gradient).reshape(1, -1)
+        return rows, self._lower, self._offset_m[:, 0] * (self.bend_max_rad - theta)
+
+    def slack_m(self, lengths_m: Array) -> Array:
+        """What is left of the bend, times d (m), for every section (n_sections,)."""
+        shapes = shapes_from_lengths(lengths_m, self._offset_m)
+        theta = np.sqrt(shapes[:, 1] ** 2 + shapes[:, 2] ** 2)
+        slack: Array = self._offset_m[:, 0] * (self.bend_max_rad - theta)
+        return slack
+
+    def clip(self, lengths_m: Array) -> Array:
+        """Unbend the sections that are beyond the limit, at constant arc length.
+
+        A length moves toward the mean of its section, so bounds that held before hold after.
+        """
+        shapes = shapes_from_lengths(lengths_m, self._offset_m)
+        theta = np.sqrt(shapes[:, 1] ** 2 + shapes[:, 2] ** 2)
+        excess = theta > self.bend_max_rad
+        if not excess.any():
+            return lengths_m
+        factor = np.where(excess, self.bend_max_rad / np.where(excess, theta, 1.0), 1.0)
+        shapes[:, 1:] *= factor[:, None]
+        return np.where(excess[:, None], lengths_from_shapes(shapes, self._offset_m), lengths_m)

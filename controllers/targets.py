@@ -1,0 +1,80 @@
+"""What the daemon can be asked for: one frozen class a kind, in SI units and the base frame."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from controllers.arm import Array
+
+
+class LawName(IntEnum):
+    """The laws, numbered as on the wire."""
+
+    DEFAULT = 0
+    RESOLVED_RATE = 1
+    QP_IK = 2
+
+
+class TargetKind(IntEnum):
+    """The kinds of target, numbered as on the wire."""
+
+    NONE = 0
+    POSITION = 1
+    POSE = 2
+    TWIST = 3
+    LENGTHS = 4
+    PRESSURES = 5
+
+
+@dataclass(frozen=True)
+class PositionTarget:
+    """Tip at ``position_m`` (3,)."""
+
+    position_m: Array
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class PoseTarget:
+    """Tip at ``position_m`` (3,) in the orientation ``quaternion_xyzw`` (4,), a unit quaternion."""
+
+    position_m: Array
+    quaternion_xyzw: Array
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class TwistTarget:
+    """Tip twist; see :class:`controllers.tasks.tip_twist.TipTwist` for frame and point."""
+
+    linear_m_s: Array
+    angular_rad_s: Array | None
+    in_tip_frame: bool
+    about_base_origin: bool
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class LengthsTarget:
+    """Chambers at ``lengths_m`` (n_sections, 3)."""
+
+    lengths_m: Array
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class PressuresTarget:
+    """Chambers at gauge ``pressures_pa`` (n_sections, 3), through the map and the same limits."""
+
+    pressures_pa: Array
+    law: LawName = LawName.DEFAULT
+
+
+Target = PositionTarget | PoseTarget | TwistTarget | LengthsTarget | PressuresTarget
+
+KIND_OF = {
+    PositionTarget: TargetKind.POSITION,
+    PoseTarget: TargetKind.POSE,
+    TwistTarget: TargetKind.TWIST,
+    LengthsTarget: TargetKind.LENGTHS,
+    PressuresTarget: TargetKind.PRESSURES,
+}

@@ -1,0 +1,51 @@
+"""What every device is to the daemon."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from controllers.arm import Array
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One reading of the device; arrays of shape ``(n_sections, 3)``, NaN where not measured.
+
+    ``true_tip`` is the tip pose ``(position_m (3,), rotation (3, 3))`` that only a simulated arm
+    knows; it is recorded, never used for control.
+    """
+
+    pressures_pa: Array
+    lengths_m: Array
+    true_tip: tuple[Array, Array] | None = None
+
+
+class Hardware(Protocol):
+    """One arm's air. The time is always an argument: no adapter reads a clock.
+
+    The order of calls is ``connect``, then ``read`` and ``write`` once a tick with ``time_s`` never
+    going back, then ``vent`` and ``close``. Every method raises HardwareError when the device does
+    not answer as it must.
+    """
+
+    #: True where the device itself zeroes its outputs when its host falls silent.
+    has_watchdog: bool
+
+    def connect(self) -> None:
+        """Open the device and set every output to zero."""
+        ...
+
+    def read(self, time_s: float) -> Measurement:
+        """Return the newest measurement."""
+        ...
+
+    def write(self, pressures_pa: Array, time_s: float) -> Array:
+        """Set gauge pressures (n_sections, 3); return what was really sent."""
+        ...
+
+    def vent(self, time_s: float) -> None:
+        """Set every output to zero, whatever was written before."""
+        ...
+
+    def close(self) -> None:
+        """Let the device go. Safe to call twice."""
+        ...

@@ -1,0 +1,1 @@
+"""What is written down and shown: messages, ring, recorder, reader, replay and view."""

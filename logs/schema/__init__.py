@@ -1,0 +1,1 @@
+"""Protobuf definitions and the Python generated from them (`make proto`)."""
