@@ -1,6 +1,5 @@
 """The controller: a target in, lengths and pressures out, once a tick."""
 
-from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
 import numpy as np
@@ -11,6 +10,7 @@ from controllers.kinematics.compiled import CompiledKinematics, TipState
 from controllers.law import AT_BOUND_M, Law, Limits
 from controllers.qp_ik import QpIk
 from controllers.resolved_rate import ResolvedRate
+from controllers.settings import ControlSettings
 from controllers.targets import (
     LawName,
     LengthsTarget,
@@ -45,18 +45,6 @@ class Binding(IntFlag):
     PRESSURE = 4
 
 
-@dataclass(frozen=True)
-class ControlSettings:
-    """Gains and tolerances of the laws."""
-
-    default_law: LawName = LawName.QP_IK
-    gain_per_s: float = 30.0
-    tip_speed_max_m_s: float = 0.3
-    reached_tolerance_m: float = 5e-4
-    stalled_rate_m_s: float = 5e-4
-    stalled_time_s: float = 0.2
-
-
 class Controller:
     """Holds the commanded lengths and moves them toward the target, inside every limit."""
 
@@ -78,10 +66,19 @@ class Controller:
             low > arm.per_chamber("length_min_m") + LENGTH_MARGIN_M,
             high < arm.per_chamber("length_max_m") - LENGTH_MARGIN_M,
         )
+        self._pressure_low = arm.per_chamber("pressure_min_pa")
+        self._pressure_high = arm.per_chamber("pressure_max_pa")
         self._task: Task | None = None
         self._law = self._laws[settings.default_law]
         self.law_name = settings.default_law
-        self._stalled_s = 0.0
+        self._near_s = self._stalled_s = 0.0
+
+    def warm_up(self) -> None:
+        """Run every law once at the rest lengths, so that no tick pays for a first use."""
+        tip = self._kinematics.evaluate(self.lengths_m)
+        task = TipPosition(tip.position_m.copy(), self.settings.gain_per_s, 1.0)
+        for law in self._laws.values():
+            law.step(task, tip, self.lengths_m, 1e-3)
 
     def start_from(self, pressures_pa: Array) -> None:
         """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
@@ -92,7 +89,8 @@ class Controller:
         """Follow a new target from where the command stands now; None holds."""
         self._task = None if target is None else self._task_of(target)
         if target is None:
-            self.reach, self.error_m, self._stalled_s = Reach.NONE, 0.0, 0.0
+            self.reach, self.error_m = Reach.NONE, 0.0
+            self._near_s = self._stalled_s = 0.0
             return
         self.law_name = self._law_name(target)
         self._law = self._laws[self.law_name]
@@ -142,8 +140,12 @@ class Controller:
         return tip
 
     def pressures_pa(self) -> Array:
-        """Gauge pressures (n_sections, 3) of the commanded lengths."""
-        return self._pressure_map.pressures_pa(self.lengths_m)
+        """Gauge pressures (n_sections, 3) of the commanded lengths, inside their limits.
+
+        The way through lengths and back rounds, and a bound must not be exceeded by one bit.
+        """
+        pressures = self._pressure_map.pressures_pa(self.lengths_m)
+        return np.minimum(np.maximum(pressures, self._pressure_low), self._pressure_high)
 
     def _judge(self, tip: TipState, moved_m: float, dt_s: float) -> None:
         """Say whether the target is reached, being reached, or out of reach."""
@@ -152,13 +154,18 @@ class Controller:
         self.error_m = self._task.error_m(tip, self.lengths_m)
         if isinstance(self._task, TipTwist):
             self.reach = Reach.MOVING
-        elif self.error_m <= self.settings.reached_tolerance_m:
+            return
+        near = self.error_m <= self.settings.reached_tolerance_m
+        still = moved_m < self.settings.stalled_rate_m_s * dt_s
+        # The air follows the command with a lag: reached is what has been there for a while.
+        self._near_s = self._near_s + dt_s if near else 0.0
+        self._stalled_s = self._stalled_s + dt_s if still and not near else 0.0
+        if self._near_s >= self.settings.settled_time_s:
             self.reach = Reach.REACHED
+        elif self._stalled_s >= self.settings.stalled_time_s:
+            self.reach = Reach.OUT_OF_REACH
         else:
-            still = moved_m < self.settings.stalled_rate_m_s * dt_s
-            self._stalled_s = self._stalled_s + dt_s if still else 0.0
-            stalled = self._stalled_s >= self.settings.stalled_time_s
-            self.reach = Reach.OUT_OF_REACH if stalled else Reach.MOVING
+            self.reach = Reach.MOVING
 
     def binding(self) -> Binding:
         """Return the limits that the commanded lengths touch."""

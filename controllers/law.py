@@ -50,6 +50,16 @@ def clamped_step(limits: Limits, lengths_m: Array, step_m: Array, dt_s: float) -
 
     Scaling keeps its direction, so the tip slows down instead of turning aside.
     """
-    allowed = limits.rate.rate_max_m_s * dt_s
-    factor = min(1.0, float((allowed / np.maximum(np.abs(step_m), 1e-15)).min()))
-    return limits.clip(lengths_m + factor * step_m.reshape(lengths_m.shape))
+    allowed = limits.rate.rate_max_m_s.reshape(lengths_m.shape) * dt_s
+    step = step_m.reshape(lengths_m.shape)
+    wanted = limits.clip(lengths_m + _share_allowed(allowed, step) * step)
+    # Unbending may take a chamber further than the step did. The bounds of length and bend are
+    # convex, so a part of the way lies inside them too.
+    moved = wanted - lengths_m
+    share = _share_allowed(allowed, moved)
+    return wanted if share > 1.0 - 1e-9 else lengths_m + share * moved
+
+
+def _share_allowed(allowed: Array, step: Array) -> float:
+    """Return the largest share, up to 1, of a step in which no chamber exceeds its allowance."""
+    return min(1.0, float((allowed / np.maximum(np.abs(step), 1e-15)).min()))

@@ -19,7 +19,9 @@ from controllers.arm import Array
 from controllers.limits.limit import Limit
 
 #: Weight of ``|x|^2`` beside the task: small against J^T J, large enough to keep P well posed.
-DAMPING = 1e-3
+#: With 1e-3 the trunk chatters at full rate before targets out of reach, and OSQP gives up in 5 %
+#: of the ticks; with 3e-2 it comes to rest there, and the way to reachable targets takes no longer.
+DAMPING = 3e-2
 
 #: Largest violation of a row (in units of the largest step) at which a result is still taken.
 ACCEPTED_VIOLATION = 1e-3

@@ -70,6 +70,8 @@ class Guard:
             intervention |= Intervention.RANGE
         largest = self._slew * self._elapsed_s(now_s)
         slewed = np.minimum(np.maximum(in_range, self._sent - largest), self._sent + largest)
+        # Last, because a device may have acknowledged a little more than the range.
+        slewed = np.minimum(np.maximum(slewed, self._low), self._high)
         if (slewed != in_range).any():
             intervention |= Intervention.SLEW
         return Guarded(slewed, intervention)
@@ -81,6 +83,9 @@ class Guard:
         return max(0.0, now_s - self._sent_at_s)
 
     def acknowledge(self, pressures_pa: Array, at_s: float) -> None:
-        """Remember what the device took, as the start of the next slew."""
-        self._sent = np.array(pressures_pa)
+        """Remember what the device took, as the start of the next slew.
+
+        An element that is not a number is unknown: the value before stays.
+        """
+        self._sent = np.where(np.isfinite(pressures_pa), pressures_pa, self._sent)
         self._sent_at_s = at_s

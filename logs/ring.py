@@ -14,7 +14,7 @@ from multiprocessing.context import SpawnContext
 from multiprocessing.sharedctypes import RawArray
 
 _SLOT = struct.Struct("<QII")  # sequence number, payload length, checksum
-_HEAD = struct.Struct("<Q")
+_HEAD = struct.Struct("@Q")  # native: one store of 8 bytes, never seen or left half written
 _CACHE_LINE = 64
 
 

@@ -6,6 +6,7 @@ An unknown array is NaN in the record and empty in the message.
 """
 
 from functools import cache
+from math import isnan
 
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
@@ -59,7 +60,7 @@ def state_from_tick(tick: np.void | np.ndarray) -> ArmState:
     state = ArmState(**{name: tick[name].item() for name in _SCALARS})
     for name in _ARRAYS:
         values = tick[name].reshape(-1).tolist()
-        if values[0] == values[0]:  # not NaN: known
+        if not all(map(isnan, values)):  # a part may be unknown: a chamber without a sensor
             getattr(state, name).extend(values)
     return state
 

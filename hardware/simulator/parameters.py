@@ -1,0 +1,76 @@
+"""What the simulated arm is made of: the nominal values, and those drawn for a seed."""
+
+from dataclasses import asdict, dataclass, fields, replace
+
+import numpy as np
+
+#: Every parameter is multiplied by a factor drawn uniformly from 1 - VARIATION to 1 + VARIATION.
+VARIATION = 0.2
+
+#: Not multiplied: a number of pieces, and the mode from which the nominal stiffness is found. The
+#: drawn arm has a mode of its own, which follows from its drawn masses and stiffnesses.
+_NOT_VARIED = frozenset({"segments_per_section", "lowest_mode_hz"})
+
+
+@dataclass(frozen=True)
+class SimulatorParameters:
+    """The nominal arm. A hysteresis is the width of its loop as a fraction of the range.
+
+    ``lowest_mode_hz`` and ``damping_ratio`` belong to the vented arm at rest under its gravity.
+    With 2.2 Hz every drawn arm stays within 1.5 to 3 Hz: hanging, upside down or weightless.
+    ``axial_stiffness_ratio`` is 1 where ``EI = EA d^2 / 2``, three tubes at the offset d.
+    """
+
+    segments_per_section: int = 5
+    mass_per_length_kg_m: float = 1.5
+    plate_mass_kg: float = 0.05
+    gyration_radius_m: float = 0.025
+    axial_stiffness_ratio: float = 1.0
+    lowest_mode_hz: float = 2.2
+    damping_ratio: float = 0.15
+    valve_time_constant_s: float = 0.06
+    valve_delay_s: float = 0.005
+    valve_resolution_pa: float = 500.0
+    valve_hysteresis_fraction: float = 0.01
+    chamber_hysteresis_fraction: float = 0.03
+    creep_fraction: float = 0.03
+    creep_time_constant_s: float = 10.0
+    sensor_noise_pa: float = 200.0
+
+
+@dataclass(frozen=True)
+class DrawnParameters:
+    """One arm of the family: ``values`` after variation, and what only a drawn arm has.
+
+    ``stiffness_factors`` is one factor a section, true over nominal stiffness: the pressures act
+    with the nominal one, so it is an error of the gain as well. ``values.lowest_mode_hz`` is the
+    nominal mode until the rod has been built and the drawn arm's own one is known.
+    """
+
+    seed: int
+    nominal: SimulatorParameters
+    values: SimulatorParameters
+    stiffness_factors: tuple[float, ...]
+
+    def with_lowest_mode(self, lowest_mode_hz: float) -> "DrawnParameters":
+        """Return a copy that also tells the drawn arm's own lowest mode."""
+        return replace(self, values=replace(self.values, lowest_mode_hz=lowest_mode_hz))
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the seed, every drawn value and every nominal one, for the session log."""
+        record = {"seed": float(self.seed)}
+        record |= {name: float(value) for name, value in asdict(self.values).items()}
+        for index, factor in enumerate(self.stiffness_factors):
+            record[f"stiffness_factor_section_{index}"] = factor
+        for name, value in asdict(self.nominal).items():
+            record[f"nominal_{name}"] = float(value)
+        return record
+
+
+def draw(nominal: SimulatorParameters, seed: int, n_sections: int) -> DrawnParameters:
+    """Draw the arm of a seed: the same arguments give the same arm, on every machine."""
+    generator = np.random.Generator(np.random.PCG64(seed))
+    names = [field.name for field in fields(nominal) if field.name not in _NOT_VARIED]
+    factors = generator.uniform(1.0 - VARIATION, 1.0 + VARIATION, len(names) + n_sections).tolist()
+    changes = {name: getattr(nominal, name) * factors.pop(0) for name in names}
+    return DrawnParameters(seed, nominal, replace(nominal, **changes), tuple(factors))

@@ -1,0 +1,1 @@
+"""The daemon: configuration, mode machine, loop, gateway, supervisor, client and commands."""

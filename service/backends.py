@@ -1,0 +1,20 @@
+"""Adapter's name -> device, loaded only when it is asked for."""
+
+from controllers.arm import Arm
+from hardware.interface import Hardware
+from service.config import Configuration
+
+
+def build(configuration: Configuration, arm: Arm) -> Hardware:
+    """Make the device that the configuration names; it is not connected yet."""
+    from hardware.simulator.adapter import SimulatedArm
+    from hardware.simulator.parameters import SimulatorParameters
+
+    return SimulatedArm(arm, SimulatorParameters(), configuration.simulator.seed)
+
+
+def drawn_parameters(configuration: Configuration, arm: Arm) -> dict[str, float]:
+    """Every parameter that the simulator draws from its seed, to repeat the run."""
+    from hardware.simulator.parameters import SimulatorParameters, draw
+
+    return draw(SimulatorParameters(), configuration.simulator.seed, arm.n_sections).as_dict()

@@ -1,0 +1,174 @@
+"""A message becomes a command only through here: frames, units, limits, finiteness, freshness."""
+
+import numpy as np
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+
+from controllers.actuation import length_bounds_m
+from controllers.arm import Arm, Array
+from controllers.errors import TargetRejected
+from controllers.targets import (
+    LawName,
+    LengthsTarget,
+    PoseTarget,
+    PositionTarget,
+    PressuresTarget,
+    Target,
+    TwistTarget,
+)
+from logs.schema import pneuarm_pb2 as pb
+
+#: A position farther than this many arm lengths is not a position in metres.
+FARTHEST_ARM_LENGTHS = 3.0
+
+#: No soft arm moves its tip faster (m/s), or turns it faster (rad/s).
+FASTEST_M_S = 5.0
+FASTEST_RAD_S = 20.0
+
+_UNIT_TOLERANCE = 1e-3
+
+
+class TargetChecker:
+    """Turns target messages for one arm into checked targets; raises TargetRejected."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm = arm
+        self._farthest_m = FARTHEST_ARM_LENGTHS * arm.max_length_m
+        self._length_low, self._length_high = length_bounds_m(arm)
+        self._pressure_low = arm.per_chamber("pressure_min_pa")
+        self._pressure_high = arm.per_chamber("pressure_max_pa")
+
+    def target(self, message: pb.Target) -> Target:
+        """Check one message."""
+        law = _law(message.law)
+        match message.WhichOneof("target"):
+            case "position":
+                position = self._position(message.position.frame_id, message.position.position_m)
+                return PositionTarget(position, law)
+            case "pose":
+                position = self._position(message.pose.frame_id, message.pose.position_m)
+                return PoseTarget(position, _quaternion(message.pose.orientation), law)
+            case "twist":
+                return _twist(message.twist, law)
+            case "lengths":
+                return LengthsTarget(self._lengths(message.lengths), law)
+            case "pressures":
+                return PressuresTarget(self._pressures(message.pressures), law)
+        raise TargetRejected(
+            "the message holds no target; one of position, pose, twist, lengths, pressures"
+        )
+
+    def tip_pose(self, message: PoseInFrame) -> tuple[Array, Array]:
+        """Check a measured tip pose; return position (3,) and quaternion (4,)."""
+        position = self._position(message.frame_id, message.pose.position)
+        return position, _quaternion(message.pose.orientation)
+
+    def _position(self, frame_id: str, vector: object) -> Array:
+        _check_frame(frame_id, ("base",))
+        position = _vector("position_m", vector)
+        distance = float(np.linalg.norm(position))
+        if distance > self._farthest_m:
+            raise TargetRejected(
+                f"position_m = {_list(position)} is {distance:.3g} m from the base, more than "
+                f"{FARTHEST_ARM_LENGTHS:g} arm lengths; is it in mm?"
+            )
+        return position
+
+    def _lengths(self, message: pb.LengthsTarget) -> Array:
+        return self._chambers(
+            "length_m", list(message.length_m), self._length_low, self._length_high, "m"
+        )
+
+    def _pressures(self, message: pb.PressuresTarget) -> Array:
+        return self._chambers(
+            "pressure_pa", list(message.pressure_pa), self._pressure_low, self._pressure_high, "Pa"
+        )
+
+    def _chambers(
+        self, name: str, values: list[float], low: Array, high: Array, unit: str
+    ) -> Array:
+        if len(values) != self._arm.n_chambers:
+            raise TargetRejected(
+                f"{name} has {len(values)} values; arm {self._arm.name} has "
+                f"{self._arm.n_chambers} chambers"
+            )
+        array = np.array(values, dtype=np.float64).reshape(low.shape)
+        _check_finite(name, array)
+        outside = (array < low) | (array > high)
+        if outside.any():
+            section, chamber = (int(index[0]) for index in np.nonzero(outside))
+            raise TargetRejected(
+                f"{name} of section {section + 1}, chamber {chamber + 1} is "
+                f"{array[section, chamber]:.6g} {unit}; allowed: {low[section, chamber]:.6g} to "
+                f"{high[section, chamber]:.6g} {unit}"
+            )
+        return array
+
+
+def _law(number: int) -> LawName:
+    try:
+        return LawName(number)
+    except ValueError:
+        raise TargetRejected(
+            f"law = {number}; allowed: 0 (the configured one), 1 (resolved rate), 2 (QP)"
+        ) from None
+
+
+def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:
+    _check_frame(message.frame_id, ("base", "tip"))
+    if message.reference_point not in ("base", "tip"):
+        raise TargetRejected(
+            f"reference_point = {message.reference_point!r}; allowed: 'base', 'tip'"
+        )
+    linear = _vector("linear_m_s", message.linear_m_s)
+    if np.linalg.norm(linear) > FASTEST_M_S:
+        raise TargetRejected(
+            f"linear_m_s = {_list(linear)} is above {FASTEST_M_S:g} m/s; is it in mm/s?"
+        )
+    angular = None
+    if message.HasField("angular_rad_s"):
+        angular = _vector("angular_rad_s", message.angular_rad_s)
+        if np.linalg.norm(angular) > FASTEST_RAD_S:
+            raise TargetRejected(
+                f"angular_rad_s = {_list(angular)} is above {FASTEST_RAD_S:g} rad/s; "
+                "is it in degrees?"
+            )
+    about_base = message.reference_point == "base"
+    if about_base and angular is None:
+        raise TargetRejected("reference_point = 'base' needs angular_rad_s as well")
+    in_tip_frame = message.frame_id == "tip"
+    if in_tip_frame and about_base:
+        raise TargetRejected("frame_id = 'tip' goes with reference_point = 'tip' only")
+    return TwistTarget(linear, angular, in_tip_frame, about_base, law)
+
+
+def _check_frame(frame_id: str, allowed: tuple[str, ...]) -> None:
+    if frame_id not in allowed:
+        names = ", ".join(repr(name) for name in allowed)
+        raise TargetRejected(f"frame_id = {frame_id!r}: unknown frame; allowed: {names}")
+
+
+def _check_finite(name: str, values: Array) -> None:
+    if not np.isfinite(values).all():
+        raise TargetRejected(f"{name} = {_list(values)}: every value must be finite")
+
+
+def _vector(name: str, message: object) -> Array:
+    vector = np.array([getattr(message, axis) for axis in "xyz"], dtype=np.float64)
+    _check_finite(name, vector)
+    return vector
+
+
+def _quaternion(message: object) -> Array:
+    quaternion = np.array([getattr(message, axis) for axis in "xyzw"], dtype=np.float64)
+    _check_finite("orientation", quaternion)
+    norm = float(np.linalg.norm(quaternion))
+    if abs(norm - 1.0) > _UNIT_TOLERANCE:
+        raise TargetRejected(
+            f"orientation = {_list(quaternion)} has the norm {norm:.4g}; a unit quaternion "
+            "(x, y, z, w) is needed"
+        )
+    return quaternion / norm
+
+
+def _list(values: Array) -> str:
+    return "[" + ", ".join(f"{value:.4g}" for value in values.reshape(-1)) + "]"

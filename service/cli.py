@@ -1,0 +1,182 @@
+"""The command line. Units at the prompt are millimetres, degrees and bar."""
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from controllers.errors import PneuarmError
+
+Command = Callable[[argparse.Namespace], int]
+
+PRESETS = ("paper", "table1", "trunk")
+_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from service.commands_daemon import run
+
+    return run(arguments)
+
+
+def _config(arguments: argparse.Namespace) -> int:
+    from service.commands_daemon import config
+
+    return config(arguments)
+
+
+def _demo(arguments: argparse.Namespace) -> int:
+    from service.demo import demo
+
+    return demo(arguments)
+
+
+def _send(arguments: argparse.Namespace) -> int:
+    from service.commands_client import send
+
+    return send(arguments)
+
+
+def _mode(arguments: argparse.Namespace) -> int:
+    from service.commands_client import mode
+
+    return mode(arguments)
+
+
+def _estop(arguments: argparse.Namespace) -> int:
+    from service.commands_client import estop
+
+    return estop(arguments)
+
+
+def _state(arguments: argparse.Namespace) -> int:
+    from service.commands_client import state
+
+    return state(arguments)
+
+
+def _replay(arguments: argparse.Namespace) -> int:
+    from service.commands_logs import replay
+
+    return replay(arguments)
+
+
+def _info(arguments: argparse.Namespace) -> int:
+    from service.commands_logs import info
+
+    return info(arguments)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    parser = argparse.ArgumentParser(
+        prog="pneuarm", description="Real-time control service for soft pneumatic arms."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_daemon(commands)
+    _add_client(commands)
+    _add_logs(commands)
+    return parser
+
+
+Subparsers = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def _command(
+    commands: Subparsers, name: str, function: Command, help_text: str
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(name, help=help_text, description=help_text)
+    parser.set_defaults(function=function)
+    return parser
+
+
+def _add_daemon(commands: Subparsers) -> None:
+    run = _command(commands, "run", _run, "Run the daemon until Ctrl-C; it ends with vented arm.")
+    config = _command(commands, "config", _config, "Show the effective configuration, or check.")
+    config.add_argument("action", choices=("show", "check"))
+    for parser in (run, config):
+        parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
+        parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
+    run.add_argument("--viewer", action="store_true", help="open Rerun's window, with a display")
+    demo = _command(commands, "demo", _demo, "Daemon and client as processes: circle, eight, ...")
+    demo.add_argument("--seconds", type=float, default=30.0, help="length of the show (default 30)")
+    demo.add_argument("--arm", choices=PRESETS, default="paper")
+    demo.add_argument("--seed", type=int, default=0, help="seed of the simulated arm")
+    demo.add_argument("--json", action="store_true", help="one JSON object instead of the table")
+
+
+def _add_client(commands: Subparsers) -> None:
+    send = _command(
+        commands, "send", _send, "Send a target until it is reached; then the arm holds."
+    )
+    kinds = send.add_subparsers(dest="kind", required=True, metavar="KIND")
+    position = kinds.add_parser("position", help="tip position in the base frame, mm")
+    position.add_argument("values", nargs=3, type=float, metavar=("X", "Y", "Z"))
+    pose = kinds.add_parser("pose", help="tip position, mm, and quaternion x y z w")
+    pose.add_argument("values", nargs=7, type=float, metavar=("X", "Y", "Z", "QX", "QY", "QZ", "QW"))
+    twist = kinds.add_parser("twist", help="tip velocity, mm/s, for some seconds")
+    twist.add_argument("values", nargs=3, type=float, metavar=("VX", "VY", "VZ"))
+    twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")
+    twist.add_argument("--frame", choices=("base", "tip"), default="base")
+    twist.add_argument("--point", choices=("tip", "base"), default="tip", help="reference point")
+    twist.add_argument("--seconds", type=float, default=1.0)
+    lengths = kinds.add_parser("lengths", help="chamber lengths, three a section, mm")
+    pressures = kinds.add_parser("pressures", help="gauge pressures, three a section, bar")
+    for parser in (lengths, pressures):
+        parser.add_argument("values", nargs="+", type=float, metavar="VALUE")
+    for parser in (position, pose, twist, lengths, pressures):
+        _add_connection(parser)
+        parser.add_argument("--enable", action="store_true", help="arm first")
+        parser.add_argument("--take-over", action="store_true", help="take the lease from another")
+        parser.add_argument("--law", choices=("resolved_rate", "qp_ik"))
+        parser.add_argument("--timeout", type=float, default=10.0, help="give up after (s)")
+    helps = {
+        "enable": "Take the lease and arm; the next `send` goes on from there.",
+        "hold": "Keep the last pressures.",
+        "vent": "Let the air out, to idle.",
+        "reset": "Leave fault or estop, to idle.",
+    }
+    for name, text in helps.items():
+        parser = _command(commands, name, _mode, text)
+        _add_connection(parser)
+        if name == "enable":
+            parser.add_argument("--take-over", action="store_true")
+    _add_connection(_command(commands, "estop", _estop, "Stop: vent at once, and latch."))
+    state = _command(commands, "state", _state, "Show the newest state.")
+    state.add_argument("--follow", action="store_true", help="go on until Ctrl-C")
+    _add_connection(state)
+
+
+def _add_connection(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
+    parser.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
+    parser.add_argument("--zenoh-config", default="", help="Zenoh configuration, for TLS")
+    parser.add_argument("--json", action="store_true", help="JSON instead of text")
+
+
+def _add_logs(commands: Subparsers) -> None:
+    replay = _command(commands, "replay", _replay, "Show a recorded session again.")
+    replay.add_argument("log", type=Path)
+    replay.add_argument("--speed", type=float, default=1.0)
+    replay.add_argument("--loop", action="store_true")
+    replay.add_argument("--to", choices=("rerun", "zenoh"), default="rerun")
+    replay.add_argument("--listen", default=_ENDPOINT, help="where to listen, with --to zenoh")
+    replay.add_argument("--port", type=int, default=9876, help="port of Rerun's server")
+    info = _command(commands, "info", _info, "Say what is in a recorded session.")
+    info.add_argument("log", type=Path)
+    info.add_argument("--json", action="store_true")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; an error is one sentence on stderr and the exit status 1."""
+    parsed = build_parser().parse_args(arguments)
+    function: Command = parsed.function
+    try:
+        return function(parsed)
+    except PneuarmError as error:
+        print(f"pneuarm: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        return 0

@@ -1,0 +1,144 @@
+"""The control process: the loop on the clock, at real-time priority.
+
+It imports neither zenoh, rerun nor mcap, and waits for nobody but the clock.
+"""
+
+import socket
+import time
+from multiprocessing.connection import Connection
+
+from hardware.interface import Hardware
+from logs.ring import RingWriter
+from logs.rings import MessageWriter
+from logs.schema import pneuarm_pb2 as pb
+from logs.topics import EVENT
+from service import backends, realtime
+from service.clock import Clock
+from service.commands import Command, ModeReply, Pipe, Shutdown
+from service.loop import Loop, LoopSettings, Timing
+from service.mode_keeper import Timeouts
+from service.process import Shared, ignore_terminal_signals
+
+#: How long the loop goes on venting after it was told to end, at most.
+VENT_BEFORE_END_S = 2.0
+_COMMANDS_PER_TICK = 16
+
+
+class ControlProcess:
+    """Runs the loop until the supervisor says to end, or is gone."""
+
+    def __init__(self, shared: Shared, gateway: Pipe, supervisor: Pipe) -> None:
+        self._shared, self._gateway, self._supervisor = shared, gateway, supervisor
+        configuration = shared.configuration
+        control = configuration.control
+        arm = configuration.build_arm()
+        self._ring = RingWriter(shared.rings.ticks)
+        self._events = MessageWriter(shared.rings.control)
+        self._hardware: Hardware = backends.build(configuration, arm)
+        settings = LoopSettings(
+            period_s=1.0 / control.rate_hz,
+            control=control.settings(),
+            timeouts=Timeouts(
+                target_s=control.target_timeout_ms * 1e-3,
+                arming_s=control.arming_timeout_s,
+                hold_s=control.hold_timeout_s,
+                full_disk_vent_s=configuration.log.full_disk_vent_s,
+            ),
+            start_ns=shared.start_ns,
+            start_unix_ns=shared.start_unix_ns,
+        )
+        self._loop = Loop(arm, settings, self._hardware, self._emit)
+        self._ending_since_ns: int | None = None
+
+    def _emit(self, event: pb.Event) -> None:
+        self._events.write(EVENT, event, event.time_unix_ns)
+
+    def run(self) -> None:
+        """Connect, run, and leave the arm vented, whatever happens in between."""
+        control = self._shared.configuration.control
+        self._hardware.connect()
+        try:
+            self._loop.warm_up()
+            locked = realtime.lock_memory()
+            granted = realtime.take_priority(control.priority)
+            realtime.freeze_garbage()
+            self._report(granted, locked)
+            self._cycle(Clock(control.rate_hz, control.spin_us))
+        finally:
+            self._hardware.vent(time.monotonic_ns() * 1e-9)
+            self._hardware.close()
+
+    def _cycle(self, clock: Clock) -> None:
+        timing, overruns, compute_s = Timing(), 0, 0.0
+        while not self._is_over():
+            wake = clock.wait()
+            begin = time.monotonic_ns()
+            overruns += wake.skipped
+            timing = Timing(wake.late_ns * 1e-9, compute_s, overruns)
+            self._tick(wake.due_ns, timing)
+            compute_s = (time.monotonic_ns() - begin) * 1e-9
+
+    def _tick(self, due_ns: int, timing: Timing) -> None:
+        commands = self._receive(due_ns)
+        disk = self._shared.recorder.disk
+        record, replies = self._loop.tick(due_ns, commands, disk, timing)
+        self._ring.write(record)
+        for reply in replies:
+            self._reply(reply)
+
+    def _reply(self, reply: ModeReply) -> None:
+        """Answer whoever asked: even numbers are the gateway's, odd ones the supervisor's."""
+        pipe = self._supervisor if reply.request_id % 2 else self._gateway
+        pipe.send(reply)
+
+    def _receive(self, now_ns: int) -> list[Command]:
+        """Take what has arrived; once the end has begun nothing counts any more."""
+        commands: list[Command] = []
+        for pipe in (self._supervisor, self._gateway):
+            for _ in range(_COMMANDS_PER_TICK):
+                message = pipe.receive()
+                if message is None:
+                    break
+                if isinstance(message, Shutdown):
+                    self._begin_ending(now_ns)
+                elif not isinstance(message, ModeReply):
+                    commands.append(message)
+        if self._supervisor.closed:
+            self._begin_ending(now_ns)
+        return [] if self._ending_since_ns is not None else commands
+
+    def _begin_ending(self, now_ns: int) -> None:
+        if self._ending_since_ns is None:
+            self._ending_since_ns = now_ns
+            self._loop.vent("the daemon ends")
+
+    def _is_over(self) -> bool:
+        """After the order to end: over as soon as the arm is empty, or the time for it is up."""
+        if self._ending_since_ns is None:
+            return False
+        waited_s = (time.monotonic_ns() - self._ending_since_ns) * 1e-9
+        return self._loop.pressure_near_zero or waited_s > VENT_BEFORE_END_S
+
+    def _report(self, granted: bool, locked: bool) -> None:
+        priority = self._shared.configuration.control.priority
+        text = f"real-time priority {priority} granted" if granted else "no real-time priority"
+        memory = "memory locked" if locked else "memory not locked"
+        self._loop.start_at(time.monotonic_ns())
+        self._loop.announce(pb.INFO if granted else pb.WARNING, "realtime", f"{text}, {memory}")
+
+
+def main(
+    shared: Shared,
+    supervisor: Pipe,
+    gateway: Pipe,
+    arm_lock: socket.socket,
+    device_lock: socket.socket,
+    end: Connection,
+) -> None:
+    """Entry point of the process.
+
+    The locks are held here too: while this process lives, no other daemon gets the device. The
+    order to end comes through the supervisor's pipe, not through ``end``.
+    """
+    ignore_terminal_signals()
+    ControlProcess(shared, gateway, supervisor).run()

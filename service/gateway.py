@@ -1,0 +1,277 @@
+"""The gateway process: Zenoh on one side, the command pipe and the tick ring on the other.
+
+Every message is checked here before it becomes a command. Zenoh's callbacks only check and pass
+on; nothing in them waits, so that a stop behind them is never delayed.
+"""
+
+import os
+import select
+import threading
+import time
+from multiprocessing.connection import Connection
+
+import zenoh
+
+from controllers.errors import LeaseRefused, TargetRejected
+from logs.codec import decode, encode, encoding_of, is_json
+from logs.rings import MessageWriter
+from logs.schema import pneuarm_pb2 as pb
+from logs.topics import (
+    ALIVE_CLIENT,
+    ALIVE_DAEMON,
+    ESTOP,
+    EVENT,
+    HEALTH,
+    INFO,
+    MODE,
+    TARGET,
+    TIP_POSE,
+    full_key,
+)
+from service import network
+from service.checks import TargetChecker
+from service.commands import Heartbeat, ModeReply, Pipe, RequestMode, SetTarget, SetTipPose
+from service.lease import Lease
+from service.mode import ModeEvent
+from service.process import Shared, ignore_terminal_signals, parent_is_alive
+from service.publisher import Publisher
+
+_PERIOD_S = 0.01
+_HEARTBEAT_S = 0.05
+_SHOWN_PAYLOAD_BYTES = 200
+
+_EVENTS = {
+    pb.ENABLE: ModeEvent.ENABLE,
+    pb.HOLD_NOW: ModeEvent.HOLD,
+    pb.VENT: ModeEvent.VENT,
+    pb.RESET: ModeEvent.RESET,
+}
+
+
+class Gateway:
+    """Checks what comes in, answers queries, publishes what the ring holds."""
+
+    def __init__(self, shared: Shared, pipe: Pipe, session: zenoh.Session) -> None:
+        control = shared.configuration.control
+        self._shared, self._pipe, self._session = shared, pipe, session
+        self._arm = shared.configuration.build_arm()
+        self._checker = TargetChecker(self._arm)
+        self._lease = Lease(control.lease_timeout_s)
+        self._messages = MessageWriter(shared.rings.gateway)
+        self._publisher = Publisher(shared, self._arm, session)
+        self._lock = threading.RLock()
+        self._pending: dict[int, tuple[zenoh.Query, str, str]] = {}
+        self._request_id = 0
+        self._rejected = 0
+        self._stale_s = control.target_timeout_ms * 1e-3
+        self._declared = self._declare()
+
+    def _declare(self) -> list[object]:
+        """Declare keys; command keys are plain subscriptions, never cached for late joiners."""
+        session, name = self._session, self._arm.name
+        alive = full_key(name, f"{ALIVE_CLIENT}/*")
+        return [
+            session.declare_subscriber(full_key(name, TARGET.key), self._on_target),
+            session.declare_subscriber(full_key(name, ESTOP.key), self._on_estop),
+            session.declare_subscriber(full_key(name, TIP_POSE.key), self._on_tip_pose),
+            session.declare_queryable(full_key(name, MODE.key), self._on_mode),
+            session.declare_queryable(full_key(name, INFO.key), self._on_info),
+            session.liveliness().declare_subscriber(alive, self._on_alive),
+            session.liveliness().declare_token(full_key(name, ALIVE_DAEMON)),
+        ]
+
+    # --- what comes in ---------------------------------------------------------------------
+
+    def _on_target(self, sample: zenoh.Sample) -> None:
+        received_ns = time.monotonic_ns()
+        payload = sample.payload.to_bytes()
+        message = pb.Target()
+        try:
+            message = decode(pb.Target, payload, str(sample.encoding))
+            target = self._checker.target(message)
+            with self._lock:
+                self._check_fresh(message.state_sequence)
+                self._lease.check_target(
+                    message.client_id, message.lease_secret, message.sequence, received_ns * 1e-9
+                )
+            self._pipe.send(SetTarget(target, message.sequence, received_ns))
+        except TargetRejected as error:
+            self._reject(TARGET.key, str(error), payload, message.client_id)
+            return
+        message.lease_secret = ""  # the log is no place for it
+        self._log(TARGET, message, received_ns)
+
+    def _check_fresh(self, state_sequence: int) -> None:
+        newest = self._publisher.newest_sequence
+        age_s = (newest - state_sequence) / self._shared.configuration.control.rate_hz
+        if state_sequence > newest + 1000 or age_s > self._stale_s:
+            raise TargetRejected(
+                f"state_sequence = {state_sequence} while the arm is at {newest}: the sender has "
+                f"not seen a state for {age_s:.3g} s (allowed: {self._stale_s:g} s); its network "
+                "is stalled, or it does not read `state`"
+            )
+
+    def _on_tip_pose(self, sample: zenoh.Sample) -> None:
+        received_ns = time.monotonic_ns()
+        payload = sample.payload.to_bytes()
+        try:
+            message = decode(TIP_POSE.message, payload, str(sample.encoding))  # type: ignore
+            position, quaternion = self._checker.tip_pose(message)
+        except TargetRejected as error:
+            self._reject(TIP_POSE.key, str(error), payload, "")
+            return
+        self._pipe.send(SetTipPose(position, quaternion, received_ns))
+        self._log(TIP_POSE, message, received_ns)
+
+    def _on_estop(self, sample: zenoh.Sample) -> None:
+        """Stop, whatever was sent and whoever sent it."""
+        self._request(ModeEvent.ESTOP, "a client")
+
+    def _on_alive(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:
+            client = str(sample.key_expr).rsplit("/", 1)[-1]
+            with self._lock:
+                held = self._lease.client_gone(client)
+            if held:
+                self._request(ModeEvent.LEASE_LOST, client)
+
+    # --- queries ---------------------------------------------------------------------------
+
+    def _on_info(self, query: zenoh.Query) -> None:
+        encoding = str(query.encoding) if query.payload is not None else ""
+        self._reply(query, self._shared.info, encoding)
+
+    def _on_mode(self, query: zenoh.Query) -> None:
+        encoding = str(query.encoding)
+        payload = b"" if query.payload is None else query.payload.to_bytes()
+        request = pb.ModeRequest()
+        try:
+            request = decode(pb.ModeRequest, payload, encoding)
+            self._handle(request, query, encoding)
+        except (TargetRejected, LeaseRefused) as error:
+            self._reject(MODE.key, str(error), b"", request.client_id)
+            reply = pb.Reply(accepted=False, reason=str(error), lease_holder=self._lease.holder)
+            reply.mode = self._publisher.newest_mode
+            self._reply(query, reply, encoding)
+
+    def _handle(self, request: pb.ModeRequest, query: zenoh.Query, encoding: str) -> None:
+        now_s = time.monotonic()
+        secret = request.lease_secret
+        with self._lock:
+            if request.action in (pb.ENABLE, pb.TAKE_LEASE):
+                secret, taken = self._lease.take(
+                    request.client_id, request.lease_secret, request.take_over, now_s
+                )
+                if taken:  # the arm holds, and the new holder arms again
+                    self._request(ModeEvent.LEASE_LOST, request.client_id)
+            elif request.action == pb.RELEASE_LEASE:
+                self._lease.release(request.client_id, secret)
+                self._request(ModeEvent.LEASE_RELEASED, request.client_id)
+        event = _EVENTS.get(request.action)
+        if event is not None:
+            self._request(event, request.client_id, (query, encoding, secret))
+        elif request.action in (pb.TAKE_LEASE, pb.RELEASE_LEASE):
+            self._reply(query, self._state_reply(True, "", secret), encoding)
+        else:
+            raise TargetRejected("action is missing; one of " + ", ".join(pb.Action.keys()[1:]))
+
+    def _request(
+        self, event: ModeEvent, client: str, asked: tuple[zenoh.Query, str, str] | None = None
+    ) -> None:
+        """Pass an event to control; its reply goes to the query that asked, if one did."""
+        with self._lock:
+            self._request_id += 2  # even: the gateway's
+            if asked is not None:
+                self._pending[self._request_id] = asked
+            sent = self._pipe.send(RequestMode(event, self._request_id, client))
+            if not sent and asked is not None:
+                del self._pending[self._request_id]
+        if not sent and asked is not None:
+            refusal = self._state_reply(False, "the control process does not answer", asked[2])
+            self._reply(asked[0], refusal, asked[1])
+
+    def _state_reply(self, accepted: bool, reason: str, secret: str) -> pb.Reply:
+        return pb.Reply(
+            accepted=accepted,
+            reason=reason,
+            lease_secret=secret,
+            lease_holder=self._lease.holder,
+            mode=self._publisher.newest_mode,
+            state_sequence=self._publisher.newest_sequence,
+        )
+
+    @staticmethod
+    def _reply(query: zenoh.Query, message: pb.Reply | pb.Info, encoding: str) -> None:
+        answer = encoding if is_json(encoding) else encoding_of(message)
+        with query:
+            query.reply(query.key_expr, encode(message, answer), encoding=answer)
+
+    def _answer(self, reply: ModeReply) -> None:
+        with self._lock:
+            asked = self._pending.pop(reply.request_id, None)
+        if asked is None:
+            return
+        query, encoding, secret = asked
+        message = self._state_reply(reply.accepted, reply.reason, secret)
+        message.mode, message.state_sequence = int(reply.mode), reply.sequence
+        self._reply(query, message, encoding)
+
+    # --- what goes out ---------------------------------------------------------------------
+
+    def _log(self, topic: object, message: object, monotonic_ns: int) -> None:
+        with self._lock:
+            self._messages.write(topic, message, self._shared.unix_ns(monotonic_ns))
+
+    def _reject(self, key: str, reason: str, payload: bytes, client: str) -> None:
+        """Tell why a message changed nothing."""
+        event = pb.Event(
+            time_unix_ns=self._shared.unix_ns(time.monotonic_ns()),
+            level=pb.WARNING,
+            source="gateway",
+            code="rejected",
+            text=f"{key}: {reason}"[:400],
+            client_id=client[:64],
+            mode=self._publisher.newest_mode,
+            payload=payload[:_SHOWN_PAYLOAD_BYTES],
+        )
+        with self._lock:
+            self._rejected += 1
+            self._messages.write(EVENT, event, event.time_unix_ns)
+
+    def run(self, end: Connection) -> None:
+        """Publish at the wire's rates until the supervisor is gone or says to end."""
+        heartbeat_s = 0.0
+        next_s = time.monotonic()
+        while parent_is_alive() and not end.poll():
+            next_s = max(next_s + _PERIOD_S, time.monotonic())
+            self._answer_until(next_s)
+            now_s = time.monotonic()
+            if now_s - heartbeat_s >= _HEARTBEAT_S:
+                heartbeat_s = now_s
+                self._pipe.send(Heartbeat(operator=bool(self._lease.holder)))
+            for health in self._publisher.step(now_s, self._rejected, self._pipe.dropped,
+                                               self._lease.holder):
+                self._log(HEALTH, health, time.monotonic_ns())
+
+    def _answer_until(self, until_s: float) -> None:
+        """Pass control's replies on as they come, until it is time to publish."""
+        while (remaining := until_s - time.monotonic()) > 0:
+            readable, _, _ = select.select([self._pipe], [], [], remaining)
+            while readable and (message := self._pipe.receive()) is not None:
+                if isinstance(message, ModeReply):
+                    self._answer(message)
+            if self._pipe.closed:  # control has ended; the last states are still to be published
+                time.sleep(max(0.0, until_s - time.monotonic()))
+                return
+
+
+def main(shared: Shared, pipe: Pipe, end: Connection) -> None:
+    """Entry point of the process; ends when told through ``end``, or when its parent is gone."""
+    ignore_terminal_signals()
+    zenoh_config = shared.configuration.zenoh
+    session = network.open_listening(zenoh_config.listen, zenoh_config.config_file)
+    try:
+        Gateway(shared, pipe, session).run(end)
+    finally:
+        session.close()
+        os._exit(0)  # Zenoh's threads may keep a Python process from ending

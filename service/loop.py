@@ -1,0 +1,294 @@
+"""One tick: read -> estimate -> control -> guard -> write -> record.
+
+The time is an argument: the same loop runs on the clock, and in simulated time in the tests.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.arm import Arm, Array
+from controllers.controller import Controller
+from controllers.estimator import Estimator
+from controllers.settings import ControlSettings
+from controllers.targets import KIND_OF, PoseTarget, PositionTarget, Target, TargetKind
+from controllers.tasks.tip_pose import quaternion_from_rotation
+from hardware.guard import Guard
+from hardware.interface import Hardware, Measurement
+from logs.schema import pneuarm_pb2 as pb
+from logs.status import Disk
+from logs.tick import new_tick
+from service.commands import (
+    Command,
+    Heartbeat,
+    ModeReply,
+    RequestMode,
+    SetTarget,
+    SetTipPose,
+)
+from service.mode import VENTED_MODES, Mode, ModeEvent
+from service.mode_keeper import ModeKeeper, Timeouts, Watched
+
+#: Gauge pressure below which a chamber counts as vented, Pa: ten times the sensors' noise.
+NEAR_ZERO_PA = 2000.0
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """What the loop needs to know; ``start_unix_ns`` is UTC at ``start_ns`` on the loop's time."""
+
+    period_s: float
+    control: ControlSettings
+    timeouts: Timeouts
+    start_ns: int
+    start_unix_ns: int
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What the clock says of this waking; ``compute_s`` is of the tick before."""
+
+    late_s: float = 0.0
+    compute_s: float = 0.0
+    overruns: int = 0
+
+
+class Loop:
+    """The control loop of one arm, without a clock."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        settings: LoopSettings,
+        hardware: Hardware,
+        emit: Callable[[pb.Event], None],
+    ) -> None:
+        self._settings = settings
+        self._hardware = hardware
+        self._controller = Controller(arm, settings.control)
+        self._estimator = Estimator(arm)
+        self._guard = Guard(arm, settings.period_s)
+        self._keeper = ModeKeeper(settings.timeouts, self._stamped(emit))
+        self._tick = new_tick(arm.n_sections)
+        self._record = self._tick.reshape(1).view(np.uint8).data
+        self._low = arm.per_chamber("pressure_min_pa")
+        self._high = arm.per_chamber("pressure_max_pa")
+        self._sent = np.zeros((arm.n_sections, 3))
+        self._target: SetTarget | None = None
+        self._tip_pose: SetTipPose | None = None
+        self._heartbeat_ns: int | None = None
+        self._operator = False
+        self._interventions = 0
+        self._now_ns = self._last_ns = settings.start_ns
+        self.sequence = 0
+
+    def _stamped(self, emit: Callable[[pb.Event], None]) -> Callable[[pb.Event], None]:
+        def stamp(event: pb.Event) -> None:
+            event.time_unix_ns = self._unix_ns()
+            emit(event)
+
+        return stamp
+
+    def _unix_ns(self) -> int:
+        return self._settings.start_unix_ns + self._now_ns - self._settings.start_ns
+
+    @property
+    def mode(self) -> Mode:
+        """The mode after the last tick."""
+        return self._keeper.mode
+
+    @property
+    def pressure_near_zero(self) -> bool:
+        """Whether every measured pressure of the last tick was near zero."""
+        measured = self._tick["pressure_measured_pa"]
+        return bool((np.abs(measured) < NEAR_ZERO_PA).all())
+
+    def warm_up(self) -> None:
+        """Run the laws once before the first tick, so that no tick pays for a first use."""
+        self._controller.warm_up()
+
+    def start_at(self, now_ns: int) -> None:
+        """Say what time it is before the first tick."""
+        self._now_ns = self._last_ns = now_ns
+
+    def vent(self, cause: str) -> None:
+        """Leave active or hold, to idle."""
+        self._keeper.apply(ModeEvent.VENT, self._now_ns * 1e-9, cause=cause)
+
+    def announce(self, level: "pb.Level", code: str, text: str) -> None:
+        """Tell something that changes no mode."""
+        self._keeper.tell(level, code, text)
+
+    def fault(self, cause: str) -> None:
+        """Latch a fault and vent at once."""
+        self._keeper.apply(ModeEvent.FAULT, self._now_ns * 1e-9, cause=cause)
+        self._sent = np.zeros_like(self._sent)
+        self._hardware.vent(self._now_ns * 1e-9)
+
+    def tick(
+        self, now_ns: int, commands: list[Command], disk: Disk, timing: Timing
+    ) -> tuple[memoryview, list[ModeReply]]:
+        """Run one tick at ``now_ns``; return its record and the replies to mode requests.
+
+        The record is a view that the next tick overwrites.
+        """
+        dt_s = (now_ns - self._last_ns) * 1e-9
+        self._now_ns = self._last_ns = now_ns
+        self.sequence += 1
+        self._fill_heading(timing)
+        replies: list[ModeReply] = []
+        try:
+            self._run(commands, replies, dt_s, disk)
+        except Exception as error:  # whatever it is: an arm that nobody controls must lose its air
+            self.fault(f"{type(error).__name__}: {error}")
+        self._tick["mode"] = int(self._keeper.mode)
+        return self._record, replies
+
+    def _run(
+        self, commands: list[Command], replies: list[ModeReply], dt_s: float, disk: Disk
+    ) -> None:
+        now_s = self._now_ns * 1e-9
+        measurement = self._hardware.read(now_s)
+        self._tick["pressure_measured_pa"] = measurement.pressures_pa
+        for command in commands:
+            self._take(command, now_s, replies)
+        self._watch(now_s, disk)
+        wanted = self._control(dt_s)
+        self._send(wanted, now_s)
+        self._fill(measurement, wanted)
+
+    def _take(self, command: Command, now_s: float, replies: list[ModeReply]) -> None:
+        match command:
+            case Heartbeat():
+                self._heartbeat_ns, self._operator = self._now_ns, command.operator
+            case SetTipPose():
+                self._tip_pose = command
+            case SetTarget():
+                # Whatever arrives before the arm is active is dropped, not kept for later.
+                if self._keeper.mode == Mode.ACTIVE:
+                    self._target = command
+                    self._controller.set_target(command.target)
+            case RequestMode():
+                replies.append(self._request(command, now_s))
+
+    def _request(self, request: RequestMode, now_s: float) -> ModeReply:
+        before = self._keeper.mode
+        if request.event == ModeEvent.LEASE_RELEASED and self._target is None:
+            reason = ""  # armed without a target yet: the next operator may go on
+        else:
+            reason = self._keeper.request(request.event, now_s, request.client)
+        if before != Mode.ACTIVE and self._keeper.mode == Mode.ACTIVE:
+            self._arm(before)
+        return ModeReply(
+            request.request_id, not reason, reason, self._keeper.mode, self.sequence
+        )
+
+    def _arm(self, before: Mode) -> None:
+        """Start without a jump: from what was last sent in hold, else from the measurement."""
+        measured = np.clip(self._tick["pressure_measured_pa"], self._low, self._high)
+        self._controller.start_from(self._sent if before == Mode.HOLD else measured)
+        self._target = None
+
+    def _watch(self, now_s: float, disk: Disk) -> None:
+        heartbeat_ns = self._settings.start_ns if self._heartbeat_ns is None else self._heartbeat_ns
+        self._keeper.watch(
+            now_s,
+            Watched(
+                target_age_s=self._target_age_s(),
+                gateway_age_s=(self._now_ns - heartbeat_ns) * 1e-9,
+                operator=self._operator,
+                disk=disk,
+                pressure_near_zero=self.pressure_near_zero,
+            ),
+        )
+        if self._keeper.mode != Mode.ACTIVE and self._target is not None:
+            self._target = None
+            self._controller.set_target(None)
+
+    def _target_age_s(self) -> float | None:
+        if self._target is None:
+            return None
+        return max(0.0, (self._now_ns - self._target.received_ns) * 1e-9)
+
+    def _control(self, dt_s: float) -> Array:
+        """Return the pressures wanted now, by mode."""
+        if self._keeper.mode == Mode.ACTIVE:
+            tip = self._controller.step(dt_s)
+            self._tick["tip_commanded_position_m"] = tip.position_m
+            return self._controller.pressures_pa()
+        self._tick["tip_commanded_position_m"] = np.nan
+        return self._sent  # hold keeps the last; in the vented modes it is zero already
+
+    def _send(self, wanted: Array, now_s: float) -> None:
+        if self._keeper.mode in VENTED_MODES:
+            self._hardware.vent(now_s)
+            self._sent = np.zeros_like(self._sent)
+            self._guard.acknowledge(self._sent, now_s)
+            self._tick["guard_intervention"] = 0
+            return
+        guarded = self._guard.check(wanted, now_s, now_s)
+        self._sent = self._hardware.write(guarded.pressures_pa, now_s)
+        self._guard.acknowledge(self._sent, now_s)
+        self._interventions += bool(guarded.intervention)
+        self._tick["guard_intervention"] = int(guarded.intervention)
+
+    def _fill_heading(self, timing: Timing) -> None:
+        """Write down what is known of every tick, even of one that fails."""
+        tick = self._tick
+        tick["sequence"] = self.sequence
+        tick["time_unix_ns"] = self._unix_ns()
+        tick["wake_latency_s"] = timing.late_s
+        tick["compute_s"] = timing.compute_s
+        tick["overruns"] = timing.overruns
+
+    def _fill(self, measurement: Measurement, wanted: Array) -> None:
+        """Write down everything about this tick."""
+        tick, controller = self._tick, self._controller
+        tick["length_commanded_m"] = controller.lengths_m
+        tick["pressure_commanded_pa"] = wanted
+        tick["pressure_sent_pa"] = self._sent
+        tick["guard_interventions"] = self._interventions
+        tick["qp_fallbacks"] = controller.fallbacks
+        self._fill_estimate(measurement)
+        self._fill_target()
+        if measurement.true_tip is not None:
+            position, rotation = measurement.true_tip
+            tick["tip_true_position_m"] = position
+            tick["tip_true_orientation_xyzw"] = quaternion_from_rotation(rotation)
+        if self._tip_pose is not None:
+            tick["tip_measured_position_m"] = self._tip_pose.position_m
+            tick["tip_measured_orientation_xyzw"] = self._tip_pose.quaternion_xyzw
+            tick["tip_measured_age_s"] = (self._now_ns - self._tip_pose.received_ns) * 1e-9
+
+    def _fill_estimate(self, measurement: Measurement) -> None:
+        lengths = self._estimator.lengths_m(measurement.pressures_pa, measurement.lengths_m)
+        tip = self._estimator.tip(lengths)
+        self._tick["length_measured_m"] = measurement.lengths_m
+        self._tick["length_estimated_m"] = lengths
+        self._tick["tip_estimated_position_m"] = tip.position_m
+        self._tick["tip_estimated_orientation_xyzw"] = quaternion_from_rotation(tip.rotation)
+
+    def _fill_target(self) -> None:
+        tick, controller, target = self._tick, self._controller, self._target
+        tick["law"] = int(controller.law_name)
+        tick["reach"] = int(controller.reach)
+        tick["target_error_m"] = controller.error_m
+        tick["binding_limits"] = int(controller.binding())
+        tick["target_position_m"] = np.nan
+        tick["target_orientation_xyzw"] = np.nan
+        if target is None:
+            tick["target_kind"] = int(TargetKind.NONE)
+            tick["target_age_s"] = 0.0
+            return
+        tick["target_kind"] = int(KIND_OF[type(target.target)])
+        tick["target_sequence"] = target.sequence
+        tick["target_age_s"] = self._target_age_s()
+        _fill_pose(tick, target.target)
+
+
+def _fill_pose(tick: np.ndarray, target: Target) -> None:
+    if isinstance(target, PositionTarget | PoseTarget):
+        tick["target_position_m"] = target.position_m
+    if isinstance(target, PoseTarget):
+        tick["target_orientation_xyzw"] = target.quaternion_xyzw

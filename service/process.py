@@ -1,0 +1,51 @@
+"""What every child process of the daemon does first, and what is handed to it."""
+
+import signal
+from dataclasses import dataclass
+from multiprocessing import parent_process
+
+from logs.rings import Rings
+from logs.schema import pneuarm_pb2 as pb
+from logs.status import RecorderStatus, ViewerStatus
+from service.config import Configuration
+from service.usage import ProcessTable
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What all processes of one daemon have in common; made by the supervisor."""
+
+    configuration: Configuration
+    info: pb.Info
+    session: str
+    start_ns: int
+    start_unix_ns: int
+    rings: Rings
+    recorder: RecorderStatus
+    viewer: ViewerStatus
+    processes: ProcessTable
+
+    def unix_ns(self, monotonic_ns: int) -> int:
+        """UTC of a monotonic time: UTC once at the start, plus monotonic time since."""
+        return self.start_unix_ns + monotonic_ns - self.start_ns
+
+    def __getstate__(self) -> dict[str, object]:
+        """Travel to a child process; a protobuf message goes as its bytes."""
+        return self.__dict__ | {"info": self.info.SerializeToString()}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Arrive in a child process."""
+        self.__dict__.update(state)
+        self.__dict__["info"] = pb.Info.FromString(state["info"])  # type: ignore[arg-type]
+
+
+def ignore_terminal_signals() -> None:
+    """Leave Ctrl-C and SIGTERM to the supervisor, which ends the processes in their order."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+
+def parent_is_alive() -> bool:
+    """Whether the supervisor still runs."""
+    parent = parent_process()
+    return parent is not None and parent.is_alive()

@@ -1,0 +1,35 @@
+"""What the operating system can do for the loop: priority, memory, no pauses."""
+
+import contextlib
+import ctypes
+import gc
+import os
+
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
+
+
+def lock_memory() -> bool:
+    """Keep all pages in memory; False where the system does not allow it."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    return bool(libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0)
+
+
+def take_priority(priority: int) -> bool:
+    """Ask for first-in-first-out scheduling; False where the system does not allow it."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError:
+        return False
+    return True
+
+
+def freeze_garbage() -> None:
+    """Take everything made so far out of the collector's sight: a full collection takes 18 ms."""
+    gc.collect()
+    gc.freeze()
+
+
+def step_back(nice: int) -> None:
+    """Let the loop and everything else go first."""
+    with contextlib.suppress(OSError):
+        os.nice(nice)

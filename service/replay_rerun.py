@@ -1,0 +1,59 @@
+"""A recorded session in Rerun: the same scene by the same code as the live view."""
+
+import time
+
+import rerun as rr
+
+from logs.reader import LogReader
+from logs.replay import paced
+from logs.schema import pneuarm_pb2 as pb
+from logs.tick import ticks_from_states
+from logs.view import View
+from service.config import Configuration, rerun_url
+from service.network import check_free
+from service.viewing import has_display, open_viewer, start_server
+
+#: The view gets ticks in batches of this many seconds, as the live one does.
+_BATCH_S = 1.0 / 30.0
+
+
+def replay_in_rerun(
+    reader: LogReader, configuration: Configuration, speed: float, loop: bool
+) -> int:
+    """Serve the log to Rerun; with a display its window opens. Goes on until Ctrl-C."""
+    bind, port = configuration.rerun.bind, configuration.rerun.port
+    check_free("--port", f"tcp/{bind}:{port}")
+    server = start_server(configuration)
+    try:
+        url = rerun_url(configuration)
+        recording = rr.RecordingStream("pneuarm", recording_id=f"replay-{reader.parts[0].stem}")
+        recording.connect_grpc(url)
+        if has_display():
+            open_viewer(url)
+        print(f"replaying {reader.parts[0]} at speed {speed:g}; see it with: rerun --connect {url}")
+        view = View(configuration.build_arm(), recording)
+        view.start()
+        _show(reader, view, speed, loop)
+        recording.flush()
+        print("the end of the log; the scene stays until Ctrl-C", flush=True)
+        while server.poll() is None:
+            time.sleep(0.2)
+    finally:
+        server.terminate()
+    return 0
+
+
+def _show(reader: LogReader, view: View, speed: float, loop: bool) -> None:
+    batch: list[pb.ArmState] = []
+    shown_s = time.monotonic()
+    for entry in paced(reader, speed, loop, time.monotonic, time.sleep):
+        if isinstance(entry.message, pb.Event):
+            view.event(entry.message)
+        elif isinstance(entry.message, pb.ArmState):
+            batch.append(entry.message)
+        if batch and time.monotonic() - shown_s >= _BATCH_S:
+            shown_s = time.monotonic()
+            view.ticks(ticks_from_states(batch, reader.n_sections))
+            batch.clear()
+    if batch:
+        view.ticks(ticks_from_states(batch, reader.n_sections))

@@ -1,0 +1,276 @@
+"""The supervisor: starts, watches and ends the processes, and can vent the device by itself."""
+
+import os
+import select
+import signal
+import socket
+import time
+from collections.abc import Callable
+from multiprocessing import get_context
+
+from controllers.errors import ConfigurationError, PneuarmError
+from logs.ring import RingReader
+from logs.rings import MessageReader, MessageWriter, Rings
+from logs.schema import pneuarm_pb2 as pb
+from logs.session import part_path, session_name
+from logs.status import RecorderStatus, ViewerStatus
+from logs.topics import EVENT
+from service import backends
+from service.announce import Announcer, start_facts
+from service.children import Child
+from service.commands import ModeReply, RequestMode, Shutdown, new_pipe
+from service.config import Configuration, log_directory
+from service.facts import info_of
+from service.local_stop import lock
+from service.mode import ModeEvent
+from service.network import check_free
+from service.process import Shared
+from service.repairing import start_mending
+from service.usage import ProcessTable
+
+_PERIOD_S = 0.02
+
+#: A control process without a tick for this long is dead or stopped.
+HEARTBEAT_S = 0.1
+_FIRST_TICK_S = 20.0
+_END_S = 5.0
+
+#: Libraries that would start threads of their own in every process.
+_SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+class Supervisor:
+    """One daemon: its locks, its shared memory, its four processes."""
+
+    def __init__(self, configuration: Configuration, say: Callable[[str], None]) -> None:
+        """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
+        self._say = say
+        self._arm_lock = lock("arm", configuration.arm.name)
+        self._device_lock = lock("device", configuration.device_address)
+        self._check_ports(configuration)
+        self._directory = log_directory(configuration)
+        self._make_directory()
+        os.environ.update(_SINGLE_THREADED)
+        self._context = get_context("spawn")
+        self._shared = self._share(configuration)
+        self._events = MessageWriter(self._shared.rings.supervisor)
+        self._announcer = Announcer(self._shared.rings, say)
+        self._ticks = RingReader(self._shared.rings.ticks)
+        self._control_pipe, self._control_end = new_pipe()
+        self._gateway_pipe, self._gateway_end = new_pipe()
+        self._children: dict[str, Child] = {}
+        self._stop_asked: dict[int, socket.socket] = {}
+        self._request_id = 1
+        self._ending = False
+
+    @staticmethod
+    def _check_ports(configuration: Configuration) -> None:
+        for endpoint in configuration.zenoh.listen:
+            check_free("zenoh.listen", endpoint)
+        if configuration.rerun.enabled:
+            rerun = configuration.rerun
+            check_free("rerun.port", f"tcp/{rerun.bind}:{rerun.port}")
+
+    def _make_directory(self) -> None:
+        try:
+            self._directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigurationError(
+                f"log.directory: {self._directory} cannot be made ({error.strerror})"
+            ) from error
+
+    def _share(self, configuration: Configuration) -> Shared:
+        arm = configuration.build_arm()
+        start_ns, start_unix_ns = time.monotonic_ns(), time.time_ns()
+        session = self._free_name(session_name(start_unix_ns, arm.name))
+        path = part_path(self._directory, session, 0)
+        shared = Shared(
+            configuration=configuration,
+            info=info_of(configuration, arm, str(path)),
+            session=session,
+            start_ns=start_ns,
+            start_unix_ns=start_unix_ns,
+            rings=Rings.create(self._context, arm.n_sections, configuration.control.rate_hz),
+            recorder=RecorderStatus.create(self._context),
+            viewer=ViewerStatus.create(self._context),
+            processes=ProcessTable.create(self._context),
+        )
+        shared.processes.started("supervisor", os.getpid())
+        return shared
+
+    def _free_name(self, name: str) -> str:
+        """Two sessions within one second get different names."""
+        candidate, number = name, 1
+        while part_path(self._directory, candidate, 0).exists():
+            number += 1
+            candidate = f"{name}-{number}"
+        return candidate
+
+    # --- running ---------------------------------------------------------------------------
+
+    def run(self) -> int:
+        """Run until SIGINT or SIGTERM, or until control is lost; return the exit status."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+        try:
+            self._start_control()
+            for line in start_facts(self._shared, self._realtime_fact()):
+                self._say(line)
+            self._start_others()
+            for path in start_mending(self._directory, self._context):
+                self._say(f"unfinished {path} was left by a crash; repairing it")
+            status = self._watch()
+        finally:
+            self._end_children()
+        return status
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        self._ending = True
+
+    def _start_control(self) -> None:
+        """Start control alone, so that nothing delays its first tick, and wait for that."""
+        locks = (self._arm_lock, self._device_lock)
+        control = self._add("control", (self._shared, self._control_end, self._gateway_end, *locks))
+        give_up_s = time.monotonic() + _FIRST_TICK_S
+        while not self._ending and control.is_alive() and self._ticks.head() == 0:
+            if time.monotonic() > give_up_s:
+                break
+            time.sleep(0.005)
+
+    def _realtime_fact(self) -> str:
+        """Return what control has said of its priority, as the first thing it says."""
+        for _, payload, _ in MessageReader((self._shared.rings.control,)).read():
+            event = pb.Event.FromString(payload)
+            if event.code == "realtime":
+                return event.text
+        return "control has not started"
+
+    def _start_others(self) -> None:
+        shared = self._shared
+        self._add("gateway", (shared, self._gateway_pipe))
+        self._add("recorder", (shared,))
+        if shared.configuration.rerun.enabled:
+            self._add("viewer", (shared,))
+
+    def _add(self, name: str, arguments: tuple[object, ...]) -> Child:
+        child = Child(name, self._context, arguments, self._shared.processes)
+        child.start()
+        self._children[name] = child
+        return child
+
+    def _watch(self) -> int:
+        newest, seen_s = 0, time.monotonic()
+        while not self._ending:
+            self._serve_local_stop(_PERIOD_S)
+            self._announcer.step()
+            self._revive()
+            head, now_s = self._ticks.head(), time.monotonic()
+            if head != newest:
+                newest, seen_s = head, now_s
+            elif now_s - seen_s > HEARTBEAT_S or not self._children["control"].is_alive():
+                self._vent_without_control()
+                return 3
+        return 0
+
+    def _revive(self) -> None:
+        """Start dead gateway, recorder and viewer again; the arm goes on, or holds by itself."""
+        for name, child in self._children.items():
+            if name != "control" and child.revive_if_due():
+                self._tell(
+                    pb.WARNING,
+                    f"{name}_restarted",
+                    f"the {name} process died and was started again",
+                    remedy="see the log for what came before",
+                )
+
+    def _vent_without_control(self) -> None:
+        """Control is dead or stopped: kill it for good, then zero the device from here."""
+        self._children["control"].kill()
+        cause = "the control process died, or made no tick for 100 ms"
+        try:
+            configuration = self._shared.configuration
+            device = backends.build(configuration, configuration.build_arm())
+            device.connect()
+            device.vent(time.monotonic_ns() * 1e-9)
+            device.close()
+        except PneuarmError as error:
+            self._tell(
+                pb.ERROR,
+                "vent_failed",
+                f"control is lost and the device could not be vented: {error}",
+                cause,
+                "cut the air supply; the device's own watchdog zeroes it where it has one",
+            )
+            return
+        self._tell(
+            pb.ERROR,
+            "control_lost",
+            "control is lost; the supervisor has vented the arm",
+            cause,
+            "start the daemon again; report it if it happens twice",
+        )
+
+    # --- the stop from this machine --------------------------------------------------------
+
+    def _serve_local_stop(self, timeout_s: float) -> None:
+        readable, _, _ = select.select([self._arm_lock, self._control_pipe], [], [], timeout_s)
+        if self._arm_lock in readable:
+            self._accept_stop()
+        if self._control_pipe in readable:
+            while (message := self._control_pipe.receive()) is not None:
+                if isinstance(message, ModeReply):
+                    self._confirm(message)
+
+    def _accept_stop(self) -> None:
+        connection, _ = self._arm_lock.accept()
+        connection.settimeout(0.1)
+        try:
+            asked = connection.recv(16)
+        except OSError:
+            asked = b""
+        if not asked.startswith(b"estop"):
+            connection.close()
+            return
+        self._request_id += 2  # odd: the supervisor's
+        self._stop_asked[self._request_id] = connection
+        self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
+
+    def _confirm(self, reply: ModeReply) -> None:
+        connection = self._stop_asked.pop(reply.request_id, None)
+        if connection is not None:
+            with connection:
+                connection.sendall(b"stopped\n" if reply.accepted else b"refused\n")
+
+    # --- the end ---------------------------------------------------------------------------
+
+    def _end_children(self) -> None:
+        """Control first, so that the arm is empty; the recorder last, so that it has all of it."""
+        control = self._children.get("control")
+        if control is not None:
+            self._control_pipe.send(Shutdown())
+            if not control.join(_END_S):
+                self._vent_without_control()
+        for name in ("gateway", "recorder", "viewer"):
+            child = self._children.get(name)
+            if child is not None and not child.end(self._patience_s(name)):
+                self._say(f"WARNING    the {name} process did not end by itself and was killed")
+        self._announcer.step()
+
+    @staticmethod
+    def _patience_s(name: str) -> float:
+        return 30.0 if name == "recorder" else 2.0
+
+    def _tell(
+        self, level: "pb.Level", code: str, text: str, cause: str = "", remedy: str = ""
+    ) -> None:
+        now_ns = self._shared.unix_ns(time.monotonic_ns())
+        event = pb.Event(
+            time_unix_ns=now_ns,
+            level=level,
+            source="supervisor",
+            code=code,
+            text=text,
+            cause=cause,
+            remedy=remedy,
+        )
+        self._events.write(EVENT, event, now_ns)

@@ -1,0 +1,122 @@
+"""The viewer process: the newest ticks to Rerun, at the rate of a screen.
+
+It may stall and may be stopped: nothing else notices, and what it did not show is counted.
+"""
+
+import ctypes
+import os
+import signal
+import subprocess
+from importlib.util import find_spec
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from controllers.errors import ConfigurationError
+from logs.ring import RingReader
+from logs.rings import MessageReader
+from logs.schema import pneuarm_pb2 as pb
+from logs.tick import tick_dtype
+from logs.topics import EVENT
+from logs.view import View
+from service import realtime
+from service.config import Configuration, rerun_url
+from service.process import Shared, ignore_terminal_signals, parent_is_alive
+
+_PERIOD_S = 1.0 / 30.0
+_PR_SET_PDEATHSIG = 1
+
+#: More than this behind (s) is not caught up but skipped.
+_CATCH_UP_S = 1.0
+
+
+def start_server(configuration: Configuration) -> "subprocess.Popen[bytes]":
+    """Start Rerun's server as its own process; in the library it would listen everywhere."""
+    rerun = configuration.rerun
+    return subprocess.Popen(
+        [
+            *(_rerun_program(), "--serve-grpc"),
+            *("--bind", rerun.bind, "--port", str(rerun.port)),
+            *("--server-memory-limit", f"{rerun.memory_limit_mib}MiB"),
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=_die_with_parent,
+    )
+
+
+def _rerun_program() -> str:
+    """Path of Rerun's own program; its Python wrapper would outlive a kill as an orphan."""
+    spec = find_spec("rerun_cli")
+    if spec is None or spec.origin is None:
+        raise ConfigurationError("rerun.enabled = true, but rerun-sdk is not installed")
+    return str(Path(spec.origin).with_name("rerun"))
+
+
+def _die_with_parent() -> None:
+    """Make the kernel end this process with its parent, however that ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def has_display() -> bool:
+    """Whether a window could be opened here."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def open_viewer(url: str) -> None:
+    """Open Rerun's own window on the live view, and leave it to its user."""
+    subprocess.Popen(
+        [_rerun_program(), "--connect", url],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+class Viewing:
+    """Feeds the view from the rings."""
+
+    def __init__(self, shared: Shared, view: View) -> None:
+        self._shared, self._view = shared, view
+        self._dtype = tick_dtype(len(shared.configuration.arm.sections))
+        self._ticks = RingReader(shared.rings.ticks)
+        self._skipped = self._ticks.skip_to(self._ticks.head())
+        self._events = MessageReader(shared.rings.messages())
+        self._most = int(_CATCH_UP_S * shared.configuration.control.rate_hz)
+
+    def step(self) -> None:
+        """Show what is new, or the newest part of it."""
+        self._skipped += self._ticks.skip_to(self._ticks.head() - self._most)
+        records = [record for _, record in self._ticks.read(self._most)]
+        if records:
+            self._view.ticks(np.frombuffer(b"".join(records), self._dtype))
+        for topic, payload, _ in self._events.read():
+            if topic is EVENT:
+                self._view.event(pb.Event.FromString(payload))
+        self._shared.viewer.publish(self._skipped + self._ticks.missed)
+
+
+def main(shared: Shared, end: Connection) -> None:
+    """Entry point of the process."""
+    ignore_terminal_signals()
+    realtime.step_back(10)
+    configuration = shared.configuration
+    server = start_server(configuration)
+    shared.processes.started("rerun", server.pid)
+    try:
+        recording = rr.RecordingStream("pneuarm", recording_id=shared.session)
+        recording.connect_grpc(rerun_url(configuration))
+        view = View(configuration.build_arm(), recording)
+        view.start()
+        if configuration.rerun.open_viewer and has_display():
+            open_viewer(rerun_url(configuration))
+        viewing = Viewing(shared, view)
+        while not end.poll(_PERIOD_S) and parent_is_alive():
+            viewing.step()
+        recording.flush(timeout_sec=1.0)
+        recording.disconnect()
+    finally:
+        server.terminate()
+        os._exit(0)  # Rerun would wait for a server that is gone
