@@ -20,9 +20,7 @@ class PressureMap:
 
     def lengths_m(self, pressures_pa: Array) -> Array:
         """Lengths of unloaded chambers at the given gauge pressures."""
-        return self._rest_m + pressures_pa * (
-            self._linear + self._quadratic * np.abs(pressures_pa)
-        )
+        return self._rest_m + pressures_pa * (self._linear + self._quadratic * np.abs(pressures_pa))
 
     def pressures_pa(self, lengths_m: Array) -> Array:
         """Gauge pressures that give the lengths; the exact inverse of :meth:`lengths_m`."""

@@ -57,6 +57,7 @@ class Controller:
         self._limits = Limits(arm)
         self._pressure_map = PressureMap(arm)
         self._kinematics = CompiledKinematics(arm)
+        self._tip = self._kinematics.evaluate(self.lengths_m)
         self._laws: dict[LawName, Law] = {
             LawName.RESOLVED_RATE: ResolvedRate(self._limits),
             LawName.QP_IK: QpIk(arm, self._limits),
@@ -83,6 +84,7 @@ class Controller:
     def start_from(self, pressures_pa: Array) -> None:
         """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
         self.lengths_m = self._limits.clip(self._pressure_map.lengths_m(pressures_pa))
+        self._tip = self._kinematics.evaluate(self.lengths_m)
         self.set_target(None)
 
     def set_target(self, target: Target | None) -> None:
@@ -128,16 +130,15 @@ class Controller:
 
         The result's arrays are reused by the next call.
         """
-        tip = self._kinematics.evaluate(self.lengths_m)
         if self._task is None:
-            return tip
-        step = self._law.step(self._task, tip, self.lengths_m, dt_s)
+            return self._tip
+        step = self._law.step(self._task, self._tip, self.lengths_m, dt_s)
         self.fallbacks += step.fell_back
         moved = float(np.abs(step.lengths_m - self.lengths_m).max())
         self.lengths_m = step.lengths_m
-        tip = self._kinematics.evaluate(self.lengths_m)
-        self._judge(tip, moved, dt_s)
-        return tip
+        self._tip = self._kinematics.evaluate(self.lengths_m)
+        self._judge(self._tip, moved, dt_s)
+        return self._tip
 
     def pressures_pa(self) -> Array:
         """Gauge pressures (n_sections, 3) of the commanded lengths, inside their limits.

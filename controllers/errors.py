@@ -1,15 +1,15 @@
 """Every exception that pneuarm raises on purpose.
 
-    PneuarmError
-    |-- InvalidInput            an argument of a function: name, value, what is allowed
-    |-- ConfigurationError      a key of the configuration
-    |-- HardwareError           a device: connection, answer, diagnosis
-    |-- LogError                a session log
-    |-- TargetRejected          a target that the daemon does not take
-    |-- ModeRefused             a mode change that is not allowed now
-    |   `-- LeaseRefused        another client holds the arm
-    `-- DaemonUnreachable       nobody answers under that address
-        `-- NotConfirmed        a command was sent and its effect was not seen
+PneuarmError
+|-- InvalidInput            an argument of a function: name, value, what is allowed
+|-- ConfigurationError      a key of the configuration
+|-- HardwareError           a device: connection, answer, diagnosis
+|-- LogError                a session log
+|-- TargetRejected          a target that the daemon does not take
+|-- ModeRefused             a mode change that is not allowed now
+|   `-- LeaseRefused        another client holds the arm
+`-- DaemonUnreachable       nobody answers under that address
+    `-- NotConfirmed        a command was sent and its effect was not seen
 """
 
 

@@ -26,9 +26,7 @@ def tip_pose(tick: np.void | np.ndarray) -> PoseInFrame:
     return PoseInFrame(
         timestamp=timestamp(tick["time_unix_ns"].item()),
         frame_id=BASE,
-        pose=Pose(
-            position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw)
-        ),
+        pose=Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw)),
     )
 
 

@@ -81,9 +81,7 @@ class LogReader:
 
     def ticks(self) -> np.ndarray:
         """All ticks as one structured array, in order; see :mod:`logs.tick`."""
-        states = [
-            entry.message for entry in self if isinstance(entry.message, pb.ArmState)
-        ]
+        states = [entry.message for entry in self if isinstance(entry.message, pb.ArmState)]
         return ticks_from_states(states, self.n_sections)
 
 
@@ -106,9 +104,7 @@ class LogSummary:
 
 def summarise(reader: LogReader) -> LogSummary:
     """Count what is in a log, and which ticks are missing between its first and last."""
-    summary = LogSummary(
-        str(reader.parts[0]), len(reader.parts), reader.finished, reader.info.arm
-    )
+    summary = LogSummary(str(reader.parts[0]), len(reader.parts), reader.finished, reader.info.arm)
     summary.versions = dict(reader.info.versions)
     summary.size_bytes = sum(part.stat().st_size for part in reader.parts)
     seen: set[int] = set()

@@ -66,8 +66,7 @@ class MessageReader:
         """Start at the given positions, or at the beginning."""
         starts = self.positions or [1] * len(self.memories)
         self._readers = [
-            RingReader(memory, start)
-            for memory, start in zip(self.memories, starts, strict=True)
+            RingReader(memory, start) for memory, start in zip(self.memories, starts, strict=True)
         ]
 
     def read(self) -> list[tuple[Topic, bytes, int]]:

@@ -113,7 +113,9 @@ def _add_client(commands: Subparsers) -> None:
     position = kinds.add_parser("position", help="tip position in the base frame, mm")
     position.add_argument("values", nargs=3, type=float, metavar=("X", "Y", "Z"))
     pose = kinds.add_parser("pose", help="tip position, mm, and quaternion x y z w")
-    pose.add_argument("values", nargs=7, type=float, metavar=("X", "Y", "Z", "QX", "QY", "QZ", "QW"))
+    pose.add_argument(
+        "values", nargs=7, type=float, metavar=("X", "Y", "Z", "QX", "QY", "QZ", "QW")
+    )
     twist = kinds.add_parser("twist", help="tip velocity, mm/s, for some seconds")
     twist.add_argument("values", nargs=3, type=float, metavar=("VX", "VY", "VZ"))
     twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")

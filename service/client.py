@@ -63,12 +63,8 @@ class Client:
         alive = full_key(self.arm, f"{ALIVE_CLIENT}/{self.client_id}")
         self._token = session.liveliness().declare_token(alive)
         # A ring of one: always the newest state, never a queue of old ones.
-        self._states = session.declare_subscriber(
-            self._key(STATE), zenoh.handlers.RingChannel(1)
-        )
-        self._events = session.declare_subscriber(
-            self._key(EVENT), zenoh.handlers.RingChannel(256)
-        )
+        self._states = session.declare_subscriber(self._key(STATE), zenoh.handlers.RingChannel(1))
+        self._events = session.declare_subscriber(self._key(EVENT), zenoh.handlers.RingChannel(256))
         self._targets = session.declare_publisher(
             self._key(TARGET),
             encoding=encoding_of(pb.Target()),
@@ -259,9 +255,7 @@ class Client:
         law: "pb.Law" = pb.DEFAULT,
     ) -> int:
         """Send a tip twist: linear (3,) m/s, angular (3,) rad/s or None."""
-        return self.send(
-            twist_target(linear_m_s, angular_rad_s, frame_id, reference_point, law)
-        )
+        return self.send(twist_target(linear_m_s, angular_rad_s, frame_id, reference_point, law))
 
     def send_lengths(self, lengths_m: Vector) -> int:
         """Send chamber lengths, three a section, m."""

@@ -107,7 +107,9 @@ def estop(arguments: argparse.Namespace) -> int:
             with _connect(arguments) as client:
                 client.estop()
         except DaemonUnreachable as error:
-            raise NotConfirmed(f"NOT CONFIRMED: {local_error}; {error}; cut the air supply") from error
+            raise NotConfirmed(
+                f"NOT CONFIRMED: {local_error}; {error}; cut the air supply"
+            ) from error
     text = f"STOPPED: arm {arguments.arm} vents, confirmed {way}; `pneuarm reset` leaves the stop"
     print(json.dumps({"stopped": True, "confirmed": way}) if arguments.json else text)
     return 0

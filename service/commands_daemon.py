@@ -28,6 +28,8 @@ def config(arguments: argparse.Namespace) -> int:
     else:
         sections = len(configuration.arm.sections)
         where = arguments.config or f"preset {configuration.preset}"
-        print(f"{where}: good; arm {configuration.arm.name}, {3 * sections} chambers, "
-              f"{configuration.control.rate_hz:g} Hz, view at {rerun_url(configuration)}")
+        print(
+            f"{where}: good; arm {configuration.arm.name}, {3 * sections} chambers, "
+            f"{configuration.control.rate_hz:g} Hz, view at {rerun_url(configuration)}"
+        )
     return 0

@@ -5,9 +5,7 @@ import dataclasses
 import json
 import tomllib
 from datetime import UTC, datetime
-from pathlib import Path
 
-from controllers.arm import Arm
 from controllers.errors import InvalidInput
 from logs.reader import LogReader, LogSummary, summarise
 from service.config import Configuration, check

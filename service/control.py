@@ -58,6 +58,7 @@ class ControlProcess:
         control = self._shared.configuration.control
         self._hardware.connect()
         try:
+            self._loop.start_at(time.monotonic_ns())
             self._loop.warm_up()
             locked = realtime.lock_memory()
             granted = realtime.take_priority(control.priority)

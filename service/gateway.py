@@ -249,8 +249,9 @@ class Gateway:
             if now_s - heartbeat_s >= _HEARTBEAT_S:
                 heartbeat_s = now_s
                 self._pipe.send(Heartbeat(operator=bool(self._lease.holder)))
-            for health in self._publisher.step(now_s, self._rejected, self._pipe.dropped,
-                                               self._lease.holder):
+            for health in self._publisher.step(
+                now_s, self._rejected, self._pipe.dropped, self._lease.holder
+            ):
                 self._log(HEALTH, health, time.monotonic_ns())
 
     def _answer_until(self, until_s: float) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.arm import Arm, Array
-from controllers.controller import Controller
+from controllers.controller import Controller, Reach
 from controllers.estimator import Estimator
 from controllers.settings import ControlSettings
 from controllers.targets import KIND_OF, PoseTarget, PositionTarget, Target, TargetKind
@@ -105,8 +105,14 @@ class Loop:
         return bool((np.abs(measured) < NEAR_ZERO_PA).all())
 
     def warm_up(self) -> None:
-        """Run the laws once before the first tick, so that no tick pays for a first use."""
+        """Go once through everything before the first tick, so that no tick pays for first uses."""
+        now_s = self._now_ns * 1e-9
         self._controller.warm_up()
+        measurement = self._hardware.read(now_s)
+        self._fill(measurement, self._sent)
+        self._controller.binding()
+        self._hardware.write(self._guard.check(self._sent, now_s, now_s).pressures_pa, now_s)
+        self._hardware.vent(now_s)
 
     def start_at(self, now_ns: int) -> None:
         """Say what time it is before the first tick."""
@@ -180,9 +186,7 @@ class Loop:
             reason = self._keeper.request(request.event, now_s, request.client)
         if before != Mode.ACTIVE and self._keeper.mode == Mode.ACTIVE:
             self._arm(before)
-        return ModeReply(
-            request.request_id, not reason, reason, self._keeper.mode, self.sequence
-        )
+        return ModeReply(request.request_id, not reason, reason, self._keeper.mode, self.sequence)
 
     def _arm(self, before: Mode) -> None:
         """Start without a jump: from what was last sent in hold, else from the measurement."""
@@ -274,7 +278,8 @@ class Loop:
         tick["law"] = int(controller.law_name)
         tick["reach"] = int(controller.reach)
         tick["target_error_m"] = controller.error_m
-        tick["binding_limits"] = int(controller.binding())
+        stuck = controller.reach == Reach.OUT_OF_REACH
+        tick["binding_limits"] = int(controller.binding()) if stuck else 0
         tick["target_position_m"] = np.nan
         tick["target_orientation_xyzw"] = np.nan
         if target is None:

@@ -1,6 +1,5 @@
 """What the gateway publishes: state, tip and tf at 100 Hz, health once a second, events as they come."""
 
-import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -61,9 +60,7 @@ class Publisher:
 
     def _publish(self, topic: Topic, message: Message) -> None:
         self._latest[topic.key] = message
-        self._publishers[topic.key].put(
-            message.SerializeToString(), encoding=encoding_of(message)
-        )
+        self._publishers[topic.key].put(message.SerializeToString(), encoding=encoding_of(message))
 
     def step(
         self, now_s: float, rejected: int, command_drops: int, lease_holder: str

@@ -29,7 +29,7 @@ _PERIOD_S = 1.0 / 30.0
 _PR_SET_PDEATHSIG = 1
 
 #: More than this behind (s) is not caught up but skipped.
-_CATCH_UP_S = 1.0
+_CATCH_UP_S = 3.0
 
 
 def start_server(configuration: Configuration) -> "subprocess.Popen[bytes]":
@@ -82,7 +82,7 @@ class Viewing:
         self._shared, self._view = shared, view
         self._dtype = tick_dtype(len(shared.configuration.arm.sections))
         self._ticks = RingReader(shared.rings.ticks)
-        self._skipped = self._ticks.skip_to(self._ticks.head())
+        self._skipped = 0
         self._events = MessageReader(shared.rings.messages())
         self._most = int(_CATCH_UP_S * shared.configuration.control.rate_hz)
 
@@ -106,7 +106,9 @@ def main(shared: Shared, end: Connection) -> None:
     server = start_server(configuration)
     shared.processes.started("rerun", server.pid)
     try:
-        recording = rr.RecordingStream("pneuarm", recording_id=shared.session)
+        recording = rr.RecordingStream(
+            f"pneuarm_{configuration.arm.name}", recording_id=shared.session
+        )
         recording.connect_grpc(rerun_url(configuration))
         view = View(configuration.build_arm(), recording)
         view.start()

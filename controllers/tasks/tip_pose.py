@@ -1,5 +1,6 @@
 """The tip at a position and in an orientation."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,26 +48,18 @@ def rotation_from_quaternion(quaternion_xyzw: Array) -> Array:
 
 def quaternion_from_rotation(rotation: Array) -> Array:
     """Unit quaternion ``(x, y, z, w)`` of a rotation matrix (3, 3), with ``w >= 0``."""
-    r = rotation
-    squares = np.array(
-        [
-            1.0 + r[0, 0] - r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] + r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] - r[1, 1] + r[2, 2],
-            1.0 + r[0, 0] + r[1, 1] + r[2, 2],
-        ]
-    )
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()  # plain floats: it runs in every tick
+    squares = (1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i, 1.0 + a + e + i)
     # Dividing by the largest of the four keeps full precision at every angle.
-    largest = int(np.argmax(squares))
-    columns = (
-        (squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]),
-        (r[0, 1] + r[1, 0], squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]),
-        (r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[2], r[1, 0] - r[0, 1]),
-        (r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], squares[3]),
+    rows = (
+        (squares[0], b + d, c + g, h - f),
+        (b + d, squares[1], f + h, c - g),
+        (c + g, f + h, squares[2], d - b),
+        (h - f, c - g, d - b, squares[3]),
     )
-    quaternion = np.array(columns[largest])
-    quaternion /= np.sqrt(quaternion @ quaternion)
-    return quaternion if quaternion[3] >= 0.0 else -quaternion
+    row = rows[squares.index(max(squares))]
+    norm = math.copysign(math.sqrt(sum(value * value for value in row)), row[3])
+    return np.array(row) / norm
 
 
 @dataclass(frozen=True)

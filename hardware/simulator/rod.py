@@ -7,6 +7,7 @@ constant along the arc. Without gravity a section therefore rests in an arc; wit
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from controllers.arm import CHAMBER_ANGLES_RAD, Arm, Array
 from controllers.errors import InvalidInput
@@ -63,7 +64,8 @@ class Rod:
         np.matmul(jacobian, jacobian.T, out=self._mass)
         damping_time_s = max(self._damping_time_s - 0.5 * step_s, 0.0)
         self._mass_diagonal += (step_s * (damping_time_s + step_s)) * loaded.stiffness
-        self.rates[:] = np.linalg.solve(self._mass, impulse)
+        # Symmetric and positive definite: Cholesky, without the checks that cost half the time.
+        self.rates[:] = dposv(self._mass, impulse)[1]
         self.shapes = self.shapes + step_s * self.rates
 
     def tip(self) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from controllers.actuation import PressureMap
 from controllers.arm import Arm, Array
 from controllers.controller import Controller, Reach
 from controllers.kinematics.constant_curvature import shapes_from_lengths, tip_transform
@@ -24,7 +25,7 @@ every_law = pytest.mark.parametrize(
 def starting_at(arm: Arm, lengths: Array) -> Controller:
     """Controller that commands the lengths now."""
     controller = Controller(arm, SETTINGS)
-    controller.lengths_m = lengths.copy()
+    controller.start_from(PressureMap(arm).pressures_pa(lengths))
     return controller
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from controllers.actuation import PressureMap
 from controllers.arm import Arm, Array
 from controllers.controller import Controller, Reach
 from controllers.kinematics.constant_curvature import tip_transform
@@ -30,7 +31,7 @@ def test_random_reachable_positions_are_reached_inside_every_limit(arm: Arm, law
     for _ in range(12):
         # The damped law may stick along the limits of the trunk: that is what the QP is for.
         share = 0.9 if law == LawName.RESOLVED_RATE else 1.0
-        controller.lengths_m = random_lengths(arm, rng, share)
+        controller.start_from(PressureMap(arm).pressures_pa(random_lengths(arm, rng, share)))
         target = position_of(arm, random_lengths(arm, rng, share), law)
         run(arm, controller, target)
         assert controller.reach == Reach.REACHED

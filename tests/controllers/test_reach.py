@@ -1,5 +1,7 @@
 """What the controller says of a target: moving, reached, out of reach, and which limit binds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,14 @@ from controllers.actuation import PressureMap
 from controllers.arm import Arm
 from controllers.controller import Binding, Controller, Reach
 from controllers.targets import LawName, PoseTarget, PositionTarget
-from tests.arms import paper_arm, random_lengths, table1_arm, trunk_arm
+from tests.arms import PAPER_SECTION, paper_arm, random_lengths, table1_arm, trunk_arm
 from tests.controllers.driving import DT_S, SETTINGS, every_arm, every_law, run, starting_at
+
+
+def without_vacuum() -> Arm:
+    """Paper's arm, bound by its pressure when short and by Eq. (4) when long."""
+    return Arm("no vacuum", (replace(PAPER_SECTION, pressure_min_pa=0.0),))
+
 
 OUT_OF_REACH = [
     (paper_arm(), (0.0, 0.0, 0.5), Binding.LENGTH),
@@ -64,6 +72,8 @@ def test_a_pose_that_one_section_cannot_have_is_out_of_reach_without_any_limit()
         (paper_arm(), (0.2, 0.0, 0.0), Binding.LENGTH),
         (paper_arm(), (-0.095, -0.095, -0.2), Binding.LENGTH),
         (paper_arm(), (0.09, -0.09, -0.09), Binding.BEND),
+        (without_vacuum(), (0.0, 0.01, 0.01), Binding.PRESSURE),
+        (without_vacuum(), (0.2, 0.1, 0.1), Binding.LENGTH),
         (table1_arm(), (0.0, 0.01, 0.01), Binding.PRESSURE),
         (table1_arm(), (0.01, 0.01, 0.2), Binding.PRESSURE),
         (table1_arm(), (0.01, 0.01, 0.01), Binding.NOTHING),

@@ -186,6 +186,13 @@ def test_a_result_counts_only_if_solved_and_within_its_rows(
     assert bench.solver.solve(problem) is None
 
 
+def test_nothing_in_the_solver_depends_on_how_long_it_takes() -> None:
+    """Adaptation of rho and the time limit would; two equal runs need not show it."""
+    solver = Bench(paper_arm()).solver._solver
+    assert not solver.get_settings().adaptive_rho
+    assert solver.get_settings().time_limit >= 1e3
+
+
 def test_the_same_problems_in_the_same_order_give_the_same_bits() -> None:
     answers = []
     for _ in range(2):
