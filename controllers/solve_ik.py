@@ -4,8 +4,9 @@
     subject to  lower <= G dq <= upper        (one block of rows a limit)
 
 The unknown is ``x = dq / step``, with ``step`` the largest step of a chamber in one tick, and the
-cost is divided by ``step^2``, the rows by ``step``: all entries are then near 1, without which OSQP runs into its
-iteration limit. rho is fixed, because its adaptation makes results depend on timing.
+cost is divided by ``step^2``, the rows by ``step``: all entries are then near 1, without which
+OSQP runs into its iteration limit. rho is fixed, because its adaptation makes results depend on
+timing.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""A log in the order and at the pace in which it was recorded. Pacing takes the clock it is given."""
+"""A log in the order and at the pace in which it was recorded; the clock is an argument."""
 
 from collections.abc import Callable, Iterator
 

@@ -58,7 +58,7 @@ class RingWriter:
     def __init__(self, memory: RingMemory) -> None:
         self._memory = memory
         self._view = memory.view()
-        (self.last_sequence,) = _HEAD.unpack_from(self._view, 0)
+        self.last_sequence: int = _HEAD.unpack_from(self._view, 0)[0]
 
     def write(self, payload: bytes | memoryview) -> int:
         """Write one record and return its number; raises ValueError if it is too long."""

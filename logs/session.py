@@ -91,7 +91,9 @@ def repair(path: Path) -> tuple[Path, int]:
         messages = _copy_records(path, temporary)
     except OSError as error:
         temporary.unlink(missing_ok=True)
-        raise LogError(f"{path} cannot be repaired: {error}; free some space and start again")
+        raise LogError(
+            f"{path} cannot be repaired: {error}; free some space and start again"
+        ) from error
     if messages == 0:
         temporary.unlink()
         return path.rename(path.with_suffix(".mcap.broken")), 0

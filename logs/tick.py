@@ -6,6 +6,7 @@ An unknown array is NaN in the record and empty in the message.
 """
 
 from functools import cache
+from typing import Any
 from math import isnan
 
 import numpy as np
@@ -22,7 +23,7 @@ _TYPES = {
 }
 
 
-def _size(field: FieldDescriptor, n_sections: int) -> tuple[int, ...]:
+def _size(field: Any, n_sections: int) -> tuple[int, ...]:
     if not field.is_repeated:
         return ()
     if field.name.endswith("position_m"):

@@ -4,10 +4,12 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from controllers.errors import PneuarmError
 
 Command = Callable[[argparse.Namespace], int]
+Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 PRESETS = ("paper", "table1", "trunk")
 _ENDPOINT = "tcp/127.0.0.1:7447"
@@ -77,9 +79,6 @@ def build_parser() -> argparse.ArgumentParser:
     _add_client(commands)
     _add_logs(commands)
     return parser
-
-
-Subparsers = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _command(

@@ -9,8 +9,11 @@ import select
 import threading
 import time
 from multiprocessing.connection import Connection
+from typing import cast
 
 import zenoh
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from google.protobuf.message import Message
 
 from controllers.errors import LeaseRefused, TargetRejected
 from logs.codec import decode, encode, encoding_of, is_json
@@ -26,6 +29,7 @@ from logs.topics import (
     MODE,
     TARGET,
     TIP_POSE,
+    Topic,
     full_key,
 )
 from service import network
@@ -115,7 +119,7 @@ class Gateway:
         received_ns = time.monotonic_ns()
         payload = sample.payload.to_bytes()
         try:
-            message = decode(TIP_POSE.message, payload, str(sample.encoding))  # type: ignore
+            message = decode(PoseInFrame, payload, str(sample.encoding))
             position, quaternion = self._checker.tip_pose(message)
         except TargetRejected as error:
             self._reject(TIP_POSE.key, str(error), payload, "")
@@ -213,12 +217,13 @@ class Gateway:
             return
         query, encoding, secret = asked
         message = self._state_reply(reply.accepted, reply.reason, secret)
-        message.mode, message.state_sequence = int(reply.mode), reply.sequence
+        message.mode = cast("pb.Mode", int(reply.mode))
+        message.state_sequence = reply.sequence
         self._reply(query, message, encoding)
 
     # --- what goes out ---------------------------------------------------------------------
 
-    def _log(self, topic: object, message: object, monotonic_ns: int) -> None:
+    def _log(self, topic: Topic, message: Message, monotonic_ns: int) -> None:
         with self._lock:
             self._messages.write(topic, message, self._shared.unix_ns(monotonic_ns))
 

@@ -35,12 +35,11 @@ def lock(kind: str, name: str) -> socket.socket:
 
 def _holder(kind: str, name: str) -> str:
     """Process number of who holds a lock, as far as the kernel tells."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        with contextlib.suppress(OSError):
-            probe.settimeout(0.2)
-            probe.connect(_address(kind, name))
-            credentials = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
-            return f" (process {struct.unpack('3i', credentials)[0]})"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe, contextlib.suppress(OSError):
+        probe.settimeout(0.2)
+        probe.connect(_address(kind, name))
+        credentials = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
+        return f" (process {struct.unpack('3i', credentials)[0]})"
     return ""
 
 

@@ -171,6 +171,6 @@ class ModeKeeper:
                 cause=cause,
                 remedy=remedy,
                 client_id=client,
-                mode=self.mode,
+                mode=pb.Mode.Name(self.mode),
             )
         )

@@ -1,6 +1,7 @@
-"""What the gateway publishes: state, tip and tf at 100 Hz, health once a second, events as they come."""
+"""What the gateway publishes: state, tip, tf and health at their rates, events as they come."""
 
 from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
 import zenoh
@@ -82,7 +83,7 @@ class Publisher:
             yield health
 
     def _publish_tick(self, tick: np.void) -> None:
-        self.newest_mode = int(tick["mode"])  # type: ignore[assignment]
+        self.newest_mode = cast("pb.Mode", int(tick["mode"]))
         self._publish(STATE, state_from_tick(tick))
         self._publish(TIP, tip_pose(tick))
         self._publish(TF, frame_transforms(tick))

@@ -18,7 +18,7 @@ from logs.topics import EVENT
 from service import backends
 from service.announce import Announcer, start_facts
 from service.children import Child
-from service.commands import ModeReply, RequestMode, Shutdown, new_pipe
+from service.commands import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from service.config import Configuration, log_directory
 from service.facts import info_of
 from service.local_stop import lock
@@ -213,7 +213,8 @@ class Supervisor:
     # --- the stop from this machine --------------------------------------------------------
 
     def _serve_local_stop(self, timeout_s: float) -> None:
-        readable, _, _ = select.select([self._arm_lock, self._control_pipe], [], [], timeout_s)
+        watched: list[socket.socket | Pipe] = [self._arm_lock, self._control_pipe]
+        readable, _, _ = select.select(watched, [], [], timeout_s)
         if self._arm_lock in readable:
             self._accept_stop()
         if self._control_pipe in readable:

@@ -5,6 +5,7 @@ more in CasADi symbols so that its derivative is exact; the tests hold the two a
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -94,13 +95,15 @@ class CompiledKinematics:
         jacobian = ca.vertcat(ca.jacobian(position, lengths), _angular_jacobian(rotation, lengths))
         dense = [ca.densify(expression) for expression in (position, rotation, jacobian)]
         self._function = ca.Function("tip", [lengths], dense)
-        self._buffer, self._evaluate = self._function.buffer()
+        buffer: Any  # CasADi's stubs do not know its own default arguments
+        buffer, self._evaluate = self._function.buffer()
+        self._buffer = buffer
         self._lengths = np.zeros(arm.n_chambers)
         # CasADi is column-major: the transposed C-order arrays are the matrices themselves.
         self._outputs = [np.zeros(3), np.zeros((3, 3)), np.zeros((arm.n_chambers, 6))]
-        self._buffer.set_arg(0, memoryview(self._lengths))
+        self._buffer.set_arg(0, self._lengths.data)
         for index, output in enumerate(self._outputs):
-            self._buffer.set_res(index, memoryview(output))
+            self._buffer.set_res(index, output.data)
         self._state = TipState(self._outputs[0], self._outputs[1].T, self._outputs[2].T)
 
     def evaluate(self, lengths_m: Array) -> TipState:

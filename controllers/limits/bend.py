@@ -23,7 +23,7 @@ class BendLimit:
     def __init__(self, arm: Arm) -> None:
         self.bend_max_rad = arm.per_section("bend_max_rad").reshape(-1)
         self._offset_m = arm.per_section("chamber_offset_m")
-        self.pattern = np.kron(np.eye(arm.n_sections), np.ones((1, 3)))
+        self.pattern: Array = np.repeat(np.eye(arm.n_sections), 3, axis=1)
         # d times the derivative of (u, v) over a section's three lengths: the rows are in metres.
         self._gradient = shapes_from_lengths(np.eye(3), 1.0)[:, 1:].T
         self._largest_m = self._offset_m * self.bend_max_rad[:, None]

@@ -11,7 +11,7 @@ class LengthLimit:
 
     def __init__(self, arm: Arm) -> None:
         self.lower_m, self.upper_m = length_bounds_m(arm)
-        self.pattern = np.eye(arm.n_chambers)
+        self.pattern: Array = np.eye(arm.n_chambers)
 
     def rows(self, lengths_m: Array, dt_s: float) -> tuple[Array, Array, Array]:
         """Identity rows: the step may go as far as the bound."""

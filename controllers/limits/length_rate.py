@@ -10,7 +10,7 @@ class LengthRateLimit:
 
     def __init__(self, arm: Arm) -> None:
         self.rate_max_m_s = arm.per_chamber("length_rate_max_m_s").reshape(-1)
-        self.pattern = np.eye(arm.n_chambers)
+        self.pattern: Array = np.eye(arm.n_chambers)
 
     def rows(self, lengths_m: Array, dt_s: float) -> tuple[Array, Array, Array]:
         """Identity rows: at most the rate times the duration of the step, both ways."""

@@ -25,13 +25,13 @@ def rotation_vector(rotation: Array) -> Array:
     sine = float(np.sqrt(axial @ axial))
     cosine = 0.5 * (float(np.trace(rotation)) - 1.0)
     if sine > 1e-9:
-        return axial * (np.arctan2(sine, cosine) / sine)
+        return axial * (math.atan2(sine, cosine) / sine)
     if cosine > 0.0:
         return axial
     # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
     column = np.argmax(np.diag(rotation))
-    axis = rotation[:, column] + np.eye(3)[column]
-    return axis * (np.pi / np.linalg.norm(axis))
+    axis: Array = rotation[:, column] + np.eye(3)[column]
+    return axis * (math.pi / float(np.linalg.norm(axis)))
 
 
 def rotation_from_quaternion(quaternion_xyzw: Array) -> Array:

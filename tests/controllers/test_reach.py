@@ -1,5 +1,6 @@
 """What the controller says of a target: moving, reached, out of reach, and which limit binds."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -119,3 +120,44 @@ def test_a_new_target_leaves_a_stall_behind() -> None:
     assert controller.reach == Reach.MOVING
     run(paper_arm(), controller, near)
     assert controller.reach == Reach.REACHED
+
+
+@pytest.mark.parametrize(
+    ("position", "time_of", "said"),
+    [
+        ((0.0, 0.0, 0.2), lambda: SETTINGS.settled_time_s, Reach.REACHED),
+        ((0.0, 0.0, 0.5), lambda: SETTINGS.stalled_time_s, Reach.OUT_OF_REACH),
+    ],
+)
+def test_near_or_still_counts_only_after_its_time_without_a_break(
+    position: tuple[float, float, float], time_of: Callable[[], float], said: Reach
+) -> None:
+    controller = starting_at(paper_arm(), paper_arm().rest_lengths_m)
+    target = PositionTarget(np.array(position))
+    run(paper_arm(), controller, target)  # until it is said for the first time
+    assert controller.reach == said
+    away = PositionTarget(np.array([0.05, 0.0, 0.2]))
+    for break_first in (True, False):
+        if break_first:
+            controller.set_target(away)
+            for _ in range(5):
+                controller.step(DT_S)
+                assert controller.reach == Reach.MOVING
+        controller.start_from(controller.pressures_pa())
+        controller.set_target(target)
+        verdicts: list[Reach] = []
+        while not verdicts or verdicts[-1] == Reach.MOVING:
+            assert len(verdicts) < 1000
+            controller.step(DT_S)
+            verdicts.append(controller.reach)
+        assert verdicts[-1] == said
+        assert len(verdicts) >= round(time_of() / DT_S)
+    assert len(verdicts) == pytest.approx(time_of() / DT_S, abs=1)  # it was there all the time
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.99, Reach.REACHED), (1.01, Reach.OUT_OF_REACH)])
+def test_reached_means_within_the_tolerance_and_no_further(share: float, said: Reach) -> None:
+    controller = Controller(paper_arm(), replace(SETTINGS, gain_per_s=0.0))  # stands still
+    offset = share * SETTINGS.reached_tolerance_m
+    run(paper_arm(), controller, PositionTarget(np.array([0.0, offset, 0.2])))
+    assert controller.reach == said

@@ -1,4 +1,4 @@
-"""Every task: its Jacobian by finite differences, its rate by its meaning, its error at the goal."""
+"""Every task: Jacobian by finite differences, rate by its meaning, no error at the goal."""
 
 from dataclasses import replace
 from functools import cache
@@ -103,7 +103,7 @@ def test_the_wanted_speed_is_limited_and_keeps_its_direction(kind: str) -> None:
 def test_the_error_of_a_position_is_the_distance() -> None:
     arm = trunk_arm()
     tip = frozen(arm, arm.rest_lengths_m)
-    task = TipPosition(tip.position_m + [0.03, 0.0, -0.04], GAIN_PER_S, NO_SPEED_LIMIT)
+    task = TipPosition(tip.position_m + np.array([0.03, 0.0, -0.04]), GAIN_PER_S, NO_SPEED_LIMIT)
     assert task.error_m(tip, arm.rest_lengths_m) == pytest.approx(0.05)
 
 
