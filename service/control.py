@@ -58,10 +58,10 @@ class ControlProcess:
         control = self._shared.configuration.control
         self._hardware.connect()
         try:
-            self._loop.start_at(time.monotonic_ns())
-            self._loop.warm_up()
             locked = realtime.lock_memory()
             granted = realtime.take_priority(control.priority)
+            self._loop.start_at(time.monotonic_ns())
+            self._loop.warm_up()
             realtime.freeze_garbage()
             self._report(granted, locked)
             self._cycle(Clock(control.rate_hz, control.spin_us))

@@ -108,8 +108,10 @@ class Loop:
         """Go once through everything before the first tick, so that no tick pays for first uses."""
         now_s = self._now_ns * 1e-9
         self._controller.warm_up()
-        measurement = self._hardware.read(now_s)
-        self._fill(measurement, self._sent)
+        self._hardware.read(now_s)
+        # The second reading has time to pass between: a simulated arm runs its physics once.
+        now_s += 1e-6
+        self._fill(self._hardware.read(now_s), self._sent)
         self._controller.binding()
         self._hardware.write(self._guard.check(self._sent, now_s, now_s).pressures_pa, now_s)
         self._hardware.vent(now_s)
