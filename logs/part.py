@@ -44,8 +44,10 @@ class PatientFile:
             del self._pending[:written]
 
     def close(self) -> None:
-        """Close and release the lock; what is still pending is lost."""
-        os.close(self._fd)
+        """Close and release the lock; what is still pending is lost. Safe to call twice."""
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
 
 
 class Part:

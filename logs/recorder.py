@@ -52,23 +52,31 @@ class Recorder:
         self._disk = Disk.OK
         self._finishing: list[Part] = []
         self._frames_every = max(1, round(info.rate_hz / (TF.logged_rate_hz or info.rate_hz)))
+        self._time_unix_ns = self._first_unix_ns()
         self._part = self._open_part()
+        self._publish()
 
     def _open_part(self) -> Part:
         settings = self._settings
         settings.directory.mkdir(parents=True, exist_ok=True)
         delete_oldest(settings.directory, settings.keep_bytes)
         path = part_path(settings.directory, settings.session, self._next_part)
+        while path.exists():  # a predecessor died before it could tell that it began this part
+            self._next_part += 1
+            path = part_path(settings.directory, settings.session, self._next_part)
         part = Part(path, self._info.arm)
         part.add_metadata("pneuarm", {"config_toml": self._info.config_toml})
-        part.write(INFO, self._info.SerializeToString(), self._now_unix_ns())
+        part.write(INFO, self._info.SerializeToString(), self._time_unix_ns)
         self._next_part += 1
         self._opened_s = self._flushed_s = time.monotonic()
         return part
 
-    @staticmethod
-    def _now_unix_ns() -> int:
-        return time.time_ns()
+    def _first_unix_ns(self) -> int:
+        """Time of the first tick to be written, so that the log's time never runs backwards."""
+        record = self._ticks.record(self._ticks.next_sequence)
+        if record is None:
+            return time.time_ns()
+        return int(np.frombuffer(record, self._dtype)[0]["time_unix_ns"])
 
     def step(self) -> int:
         """Move what is new into the file, flush and roll when due; return the number of records."""
@@ -84,7 +92,7 @@ class Recorder:
         return len(records) + len(messages)
 
     def _write_tick(self, sequence: int, tick: np.void) -> None:
-        time_unix_ns = int(tick["time_unix_ns"])
+        time_unix_ns = self._time_unix_ns = int(tick["time_unix_ns"])
         self._part.write(STATE, state_from_tick(tick).SerializeToString(), time_unix_ns, sequence)
         if sequence % self._frames_every == 0:
             self._part.write(TIP, tip_pose(tick).SerializeToString(), time_unix_ns)
@@ -111,7 +119,10 @@ class Recorder:
     def _roll_if_due(self, now: float) -> None:
         too_large = self._part.size_bytes >= self._settings.roll_bytes
         if too_large or now - self._opened_s >= self._settings.roll_s:
-            full, self._part = self._part, self._open_part()
+            try:
+                full, self._part = self._part, self._open_part()
+            except OSError:
+                return  # this part goes on; the next flush tries again
             self._finishing.append(full)
 
     def _publish(self) -> None:

@@ -7,6 +7,7 @@ from multiprocessing.context import SpawnContext
 from google.protobuf.message import Message
 
 from logs.ring import RingMemory, RingReader, RingWriter
+from logs.schema import pneuarm_pb2 as pb
 from logs.tick import tick_dtype
 from logs.topics import LOGGED, Topic
 
@@ -16,6 +17,9 @@ _MESSAGE_BYTES = 1008
 _MESSAGES = 32768
 _EVENTS = 4096
 _HEADER = struct.Struct("<Hq")  # index in LOGGED, time
+
+#: Longest text of an event where a whole one does not fit, so that the event itself does.
+_SHORT_BYTES = 250
 
 
 @dataclass(frozen=True)
@@ -50,9 +54,27 @@ class MessageWriter:
         self._ring = RingWriter(memory)
 
     def write(self, topic: Topic, message: Message, time_unix_ns: int) -> None:
-        """Write one message; raises ValueError if it is longer than a record."""
+        """Write one message; raises ValueError if it is longer than a record.
+
+        The texts of an event are cut to fit: they may hold anything, and the event must arrive.
+        """
+        if isinstance(message, pb.Event) and message.ByteSize() > _MESSAGE_BYTES - _HEADER.size:
+            message = _shortened(message)
         header = _HEADER.pack(LOGGED.index(topic), time_unix_ns)
         self._ring.write(header + message.SerializeToString())
+
+
+def _shortened(event: pb.Event) -> pb.Event:
+    short = pb.Event()
+    short.CopyFrom(event)
+    short.text, short.cause = _cut(event.text, _SHORT_BYTES), _cut(event.cause, _SHORT_BYTES)
+    short.remedy, short.client_id = _cut(event.remedy, 100), _cut(event.client_id, 64)
+    short.payload = event.payload[:100]
+    return short
+
+
+def _cut(text: str, size: int) -> str:
+    return text.encode()[:size].decode(errors="ignore")
 
 
 @dataclass

@@ -136,11 +136,17 @@ def _copy_records(source: Path, destination: Path) -> int:
     return count
 
 
+def _age(path: Path) -> tuple[str, str]:
+    """Sort key, oldest first: session, then part; by the bare name the first part sorts last."""
+    session, _, part = path.stem.partition(".")
+    return session, part
+
+
 def delete_oldest(directory: Path, keep_bytes: int) -> list[Path]:
     """Delete the oldest finished parts until the rest fits ``keep_bytes``; 0 keeps everything."""
     if keep_bytes <= 0:
         return []
-    files = sorted(directory.glob("*.mcap"), reverse=True)
+    files = sorted(directory.glob("*.mcap"), key=_age, reverse=True)
     total, deleted = 0, []
     for path in files:
         total += path.stat().st_size

@@ -142,10 +142,10 @@ class LogConfig(_Table):
     """The session log. ``directory`` empty means the user's state directory."""
 
     directory: str = ""
-    roll_mib: Annotated[float, Field(gt=0)] = 1024.0
-    roll_minutes: Annotated[float, Field(gt=0)] = 60.0
-    keep_gib: Annotated[float, Field(ge=0)] = 0.0
-    min_free_mib: Annotated[float, Field(ge=0)] = 1024.0
+    roll_mib: Positive = 1024.0
+    roll_minutes: Positive = 60.0
+    keep_gib: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    min_free_mib: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 1024.0
     full_disk_vent_s: Annotated[float, Field(ge=0, le=600)] = 5.0
 
 
@@ -222,7 +222,7 @@ def _read(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text())
     except OSError as error:
         raise ConfigurationError(f"{path} cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ConfigurationError(f"{path} is not TOML: {error}") from error
 
 

@@ -58,10 +58,10 @@ class ControlProcess:
         control = self._shared.configuration.control
         self._hardware.connect()
         try:
-            locked = realtime.lock_memory()
             granted = realtime.take_priority(control.priority)
             self._loop.start_at(time.monotonic_ns())
             self._loop.warm_up()
+            locked = realtime.lock_memory()
             realtime.freeze_garbage()
             self._report(granted, locked)
             self._cycle(Clock(control.rate_hz, control.spin_us))
@@ -122,10 +122,12 @@ class ControlProcess:
 
     def _report(self, granted: bool, locked: bool) -> None:
         priority = self._shared.configuration.control.priority
-        text = f"real-time priority {priority} granted" if granted else "no real-time priority"
+        text = f"priority {priority} granted" if granted else "priority not granted"
         memory = "memory locked" if locked else "memory not locked"
         self._loop.start_at(time.monotonic_ns())
-        self._loop.announce(pb.INFO if granted else pb.WARNING, "realtime", f"{text}, {memory}")
+        self._loop.announce(
+            pb.INFO if granted else pb.WARNING, "realtime", f"real-time {text}, {memory}"
+        )
 
 
 def main(

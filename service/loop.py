@@ -129,10 +129,14 @@ class Loop:
         self._keeper.tell(level, code, text)
 
     def fault(self, cause: str) -> None:
-        """Latch a fault and vent at once."""
-        self._keeper.apply(ModeEvent.FAULT, self._now_ns * 1e-9, cause=cause)
+        """Latch a fault and vent at once; where even that fails, the next tick tries again."""
+        now_s = self._now_ns * 1e-9
         self._sent = np.zeros_like(self._sent)
-        self._hardware.vent(self._now_ns * 1e-9)
+        try:
+            self._hardware.vent(now_s)
+        except Exception as error:
+            cause += f"; the device could not be vented: {error}"
+        self._keeper.apply(ModeEvent.FAULT, now_s, cause=cause)
 
     def tick(
         self, now_ns: int, commands: list[Command], disk: Disk, timing: Timing
@@ -157,10 +161,12 @@ class Loop:
         self, commands: list[Command], replies: list[ModeReply], dt_s: float, disk: Disk
     ) -> None:
         now_s = self._now_ns * 1e-9
-        measurement = self._hardware.read(now_s)
-        self._tick["pressure_measured_pa"] = measurement.pressures_pa
-        for command in commands:
-            self._take(command, now_s, replies)
+        try:
+            measurement = self._hardware.read(now_s)
+            self._tick["pressure_measured_pa"] = measurement.pressures_pa
+        finally:  # a stop is heard and answered also when the device fails
+            for command in commands:
+                self._take(command, now_s, replies)
         self._watch(now_s, disk)
         wanted = self._control(dt_s)
         self._send(wanted, now_s)

@@ -78,7 +78,10 @@ TABLE: dict[tuple[Mode, ModeEvent], Mode] = {
 }
 
 _WHY_NOT: dict[tuple[Mode, ModeEvent], str] = {
-    (Mode.IDLE, ModeEvent.ENABLE): "the chambers are still venting; try again when ready",
+    (
+        Mode.IDLE,
+        ModeEvent.ENABLE,
+    ): "the chambers are still venting, or the recorder has not started; try again when ready",
     (Mode.ACTIVE, ModeEvent.ENABLE): "the arm is active already",
     (Mode.FAULT, ModeEvent.ENABLE): "a fault is latched; remove its cause and reset first",
     (Mode.ESTOP, ModeEvent.ENABLE): "the emergency stop is latched; reset first",

@@ -87,7 +87,7 @@ class ModeKeeper:
         self.mode = Mode.IDLE
         self._timeouts = timeouts
         self._emit = emit
-        self._entered_s = 0.0
+        self._entered_s = self._operator_s = self._not_full_s = 0.0
         self._disk = Disk.STARTING
 
     def request(self, event: ModeEvent, now_s: float, client: str) -> str:
@@ -124,7 +124,12 @@ class ModeKeeper:
     def watch(self, now_s: float, watched: Watched) -> None:
         """Let time and the other processes change the mode; in order of urgency."""
         self._disk = watched.disk
+        if watched.operator:
+            self._operator_s = now_s
+        if watched.disk != Disk.FULL:
+            self._not_full_s = now_s
         in_mode_s = now_s - self._entered_s
+        recording = watched.disk != Disk.STARTING  # nothing moves before it is recorded
         if self.mode in (Mode.ACTIVE, Mode.HOLD):
             if watched.gateway_age_s > GATEWAY_LOST_S:
                 self.apply(ModeEvent.GATEWAY_LOST, now_s)
@@ -133,8 +138,8 @@ class ModeKeeper:
         if self.mode == Mode.ACTIVE:
             self._watch_active(now_s, in_mode_s, watched)
         elif self.mode == Mode.HOLD:
-            self._watch_hold(now_s, in_mode_s, watched)
-        elif self.mode == Mode.IDLE and watched.pressure_near_zero:
+            self._watch_hold(now_s, watched)
+        elif self.mode == Mode.IDLE and watched.pressure_near_zero and recording:
             self.apply(ModeEvent.VENTED, now_s)
 
     def _watch_active(self, now_s: float, in_mode_s: float, watched: Watched) -> None:
@@ -146,10 +151,12 @@ class ModeKeeper:
         elif watched.target_age_s > self._timeouts.target_s:
             self.apply(ModeEvent.TARGET_STALE, now_s)
 
-    def _watch_hold(self, now_s: float, in_mode_s: float, watched: Watched) -> None:
-        if watched.disk == Disk.FULL and in_mode_s > self._timeouts.full_disk_vent_s:
+    def _watch_hold(self, now_s: float, watched: Watched) -> None:
+        full_s = now_s - max(self._entered_s, self._not_full_s)
+        alone_s = now_s - max(self._entered_s, self._operator_s)
+        if watched.disk == Disk.FULL and full_s > self._timeouts.full_disk_vent_s:
             self.apply(ModeEvent.DISK_STILL_FULL, now_s)
-        elif not watched.operator and in_mode_s > self._timeouts.hold_s:
+        elif not watched.operator and alone_s > self._timeouts.hold_s:
             self.apply(ModeEvent.HOLD_TIMEOUT, now_s)
 
     def tell(

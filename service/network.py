@@ -34,8 +34,10 @@ def check_free(key: str, endpoint: str) -> None:
     """Raise ConfigurationError if a TCP endpoint is taken already, before anything is started."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    if protocol not in ("tcp", "tls") or not port.isdigit():
+    if protocol not in ("tcp", "tls") or not port.isdecimal():
         return  # Zenoh itself judges other kinds of endpoints
+    if int(port) > 65535:
+        raise ConfigurationError(f"{key}: port {port} of {endpoint}; allowed: 0 to 65535")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

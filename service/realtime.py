@@ -5,13 +5,17 @@ import ctypes
 import gc
 import os
 
-_MCL_CURRENT, _MCL_FUTURE = 1, 2
+_MCL_CURRENT, _MCL_ONFAULT = 1, 4
 
 
 def lock_memory() -> bool:
-    """Keep all pages in memory; False where the system does not allow it."""
+    """Keep every page that is used in memory; False where the system does not allow it.
+
+    Only what is mapped now: with a limit on locked memory, locking the future too would make a
+    later allocation fail in the middle of a run.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
-    return bool(libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0)
+    return bool(libc.mlockall(_MCL_CURRENT | _MCL_ONFAULT) == 0)
 
 
 def take_priority(priority: int) -> bool:

@@ -1,6 +1,7 @@
 """A recorded session in Rerun: the same scene by the same code as the live view."""
 
 import time
+from itertools import count
 
 import rerun as rr
 
@@ -26,15 +27,13 @@ def replay_in_rerun(
     server = start_server(configuration)
     try:
         url = rerun_url(configuration)
-        recording = rr.RecordingStream("pneuarm", recording_id=f"replay-{reader.parts[0].stem}")
-        recording.connect_grpc(url)
         if has_display():
             open_viewer(url)
         print(f"replaying {reader.parts[0]} at speed {speed:g}; see it with: rerun --connect {url}")
-        view = View(configuration.build_arm(), recording)
-        view.start()
-        _show(reader, view, speed, loop)
-        recording.flush()
+        for number in count(1):
+            _round(reader, configuration, speed, number)
+            if not loop:
+                break
         print("the end of the log; the scene stays until Ctrl-C", flush=True)
         while server.poll() is None:
             time.sleep(0.2)
@@ -43,10 +42,22 @@ def replay_in_rerun(
     return 0
 
 
-def _show(reader: LogReader, view: View, speed: float, loop: bool) -> None:
+def _round(reader: LogReader, configuration: Configuration, speed: float, number: int) -> None:
+    """Show the whole log once, as a recording of its own."""
+    name = f"replay-{reader.parts[0].stem}-{number}"
+    recording = rr.RecordingStream(f"pneuarm_{configuration.arm.name}", recording_id=name)
+    recording.connect_grpc(rerun_url(configuration))
+    view = View(configuration.build_arm(), recording)
+    view.start()
+    _show(reader, view, speed)
+    recording.flush()
+    recording.disconnect()
+
+
+def _show(reader: LogReader, view: View, speed: float) -> None:
     batch: list[pb.ArmState] = []
     shown_s = time.monotonic()
-    for entry in paced(reader, speed, loop, time.monotonic, time.sleep):
+    for entry in paced(reader, speed, False, time.monotonic, time.sleep):
         if isinstance(entry.message, pb.Event):
             view.event(entry.message)
         elif isinstance(entry.message, pb.ArmState):

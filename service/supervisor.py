@@ -142,7 +142,7 @@ class Supervisor:
         for _, payload, _ in MessageReader((self._shared.rings.control,)).read():
             event = pb.Event.FromString(payload)
             if event.code == "realtime":
-                return event.text
+                return event.text.removeprefix("real-time ")
         return "control has not started"
 
     def _start_others(self) -> None:
