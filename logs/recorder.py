@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from controllers.arm import Arm
+from logs.body import body_points
 from logs.frames import frame_transforms, tip_pose
 from logs.part import Part
 from logs.ring import RingReader
@@ -19,7 +21,7 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.session import delete_oldest, part_path
 from logs.status import Disk, RecorderStatus
 from logs.tick import state_from_tick, tick_dtype
-from logs.topics import INFO, STATE, TF, TIP
+from logs.topics import BODY, INFO, STATE, TF, TIP, Topic
 
 _TICKS_AT_ONCE = 500
 _FLUSH_S = 0.4
@@ -31,11 +33,16 @@ class RecorderSettings:
 
     directory: Path
     session: str
-    n_sections: int
+    arm: Arm
     roll_bytes: int
     roll_s: float
     keep_bytes: int
     min_free_bytes: int
+
+
+def _every(topic: Topic, rate_hz: float) -> int:
+    """Every how many ticks a topic is logged."""
+    return max(1, round(rate_hz / (topic.logged_rate_hz or rate_hz)))
 
 
 class Recorder:
@@ -45,13 +52,14 @@ class Recorder:
         self, settings: RecorderSettings, info: pb.Info, rings: Rings, status: RecorderStatus
     ) -> None:
         self._settings, self._info, self._status = settings, info, status
-        self._dtype = tick_dtype(settings.n_sections)
+        self._dtype = tick_dtype(settings.arm.n_sections)
         next_tick, next_messages, self._next_part = status.progress(len(rings.messages()))
         self._ticks = RingReader(rings.ticks, max(1, next_tick))
         self._messages = MessageReader(rings.messages(), next_messages)
         self._disk = Disk.OK
         self._finishing: list[Part] = []
-        self._frames_every = max(1, round(info.rate_hz / (TF.logged_rate_hz or info.rate_hz)))
+        self._frames_every = _every(TF, info.rate_hz)
+        self._body_every = _every(BODY, info.rate_hz)
         self._time_unix_ns = self._first_unix_ns()
         self._part = self._open_part()
         self._publish()
@@ -97,6 +105,9 @@ class Recorder:
         if sequence % self._frames_every == 0:
             self._part.write(TIP, tip_pose(tick).SerializeToString(), time_unix_ns)
             self._part.write(TF, frame_transforms(tick).SerializeToString(), time_unix_ns)
+        if sequence % self._body_every == 0:
+            body = body_points(self._settings.arm, tick)
+            self._part.write(BODY, body.SerializeToString(), time_unix_ns)
 
     def _flush(self, now: float) -> None:
         """Put everything on the disk; on failure keep it and report, to try again next time."""

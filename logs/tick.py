@@ -6,8 +6,8 @@ An unknown array is NaN in the record and empty in the message.
 """
 
 from functools import cache
-from typing import Any
 from math import isnan
+from typing import Any
 
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor

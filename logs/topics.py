@@ -6,6 +6,7 @@ Everything that publishes, subscribes, records or reads takes the keys from here
 from dataclasses import dataclass
 
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf.message import Message
 
@@ -21,7 +22,7 @@ class Topic:
     """
 
     key: str
-    direction: str  # in, out or query
+    direction: str  # in, out, query, or file: recorded only
     message: type[Message] | None
     rate_hz: float | None = None
     logged: bool = True
@@ -35,11 +36,12 @@ TIP_POSE = Topic("sensor/tip_pose", "in", PoseInFrame)
 STATE = Topic("state", "out", pb.ArmState, rate_hz=100.0)
 TIP = Topic("tip", "out", PoseInFrame, rate_hz=100.0, logged_rate_hz=100.0)
 TF = Topic("tf", "out", FrameTransforms, rate_hz=100.0, logged_rate_hz=100.0)
+BODY = Topic("body", "file", PointCloud, logged_rate_hz=20.0)
 HEALTH = Topic("health", "out", pb.Health, rate_hz=1.0)
 EVENT = Topic("event", "out", pb.Event)
 INFO = Topic("info", "query", pb.Info)
 
-TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, HEALTH, EVENT, INFO)
+TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, BODY, HEALTH, EVENT, INFO)
 LOGGED = tuple(topic for topic in TOPICS if topic.logged)
 
 #: Liveliness tokens.

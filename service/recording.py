@@ -24,7 +24,7 @@ def settings(shared: Shared) -> RecorderSettings:
     return RecorderSettings(
         directory=log_directory(shared.configuration),
         session=shared.session,
-        n_sections=len(shared.configuration.arm.sections),
+        arm=shared.configuration.build_arm(),
         roll_bytes=int(log.roll_mib * _MIB),
         roll_s=log.roll_minutes * 60.0,
         keep_bytes=int(log.keep_gib * 1024 * _MIB),

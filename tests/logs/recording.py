@@ -15,6 +15,7 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.status import RecorderStatus
 from logs.tick import new_tick
 from logs.topics import EVENT
+from tests.arms import paper_arm
 
 CONTEXT = multiprocessing.get_context("spawn")
 START_NS = 1_800_000_000_000_000_000
@@ -48,7 +49,7 @@ class Session:
         self.settings = RecorderSettings(
             directory=directory,
             session="s-paper",
-            n_sections=1,
+            arm=paper_arm(),
             roll_bytes=1 << 30,
             roll_s=1e9,
             keep_bytes=0,

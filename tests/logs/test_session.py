@@ -1,0 +1,179 @@
+"""Session files: names, parts, what a crash leaves, and mending it."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.writer import Writer
+
+from controllers.errors import LogError
+from logs.part import Part
+from logs.reader import LogReader
+from logs.session import (
+    delete_oldest,
+    is_finished,
+    part_path,
+    parts_of,
+    repair,
+    session_name,
+    unfinished,
+)
+from tests.logs.recording import make_session, recorded
+
+CHUNKS = 8
+TICKS = 60  # a chunk
+
+
+@pytest.fixture(scope="module")
+def cut(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[bytes, list[int]]]:
+    """A finished session file, and its size after each flush."""
+    directory = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        session = make_session(directory, patch)
+        recorder = session.recorder()
+        sizes = []
+        for _ in range(CHUNKS):
+            session.write_ticks(TICKS)
+            session.write_events(1)
+            session.flush(recorder)
+            sizes.append(session.path.stat().st_size)
+        recorder.finish()
+    yield session.path.read_bytes(), sizes
+
+
+def chunks_within(size: int, sizes: list[int]) -> int:
+    return sum(flushed <= size for flushed in sizes)
+
+
+@given(share=st.floats(0, 1), near=st.integers(-9, 9))
+def test_a_file_cut_anywhere_is_readable_up_to_its_last_whole_chunk(
+    cut: tuple[bytes, list[int]],
+    tmp_path_factory: pytest.TempPathFactory,
+    share: float,
+    near: int,
+) -> None:
+    whole, sizes = cut
+    # Half of the cuts fall close to the end of a chunk, where the mistakes are.
+    size = int(share * len(whole)) if near % 2 else sizes[int(share * (CHUNKS - 1))] + near
+    path = tmp_path_factory.mktemp("cut") / "cut.mcap"
+    path.write_bytes(whole[:size])
+    chunks = chunks_within(size, sizes)
+    if chunks == 0:
+        with pytest.raises(LogError):
+            LogReader(path)
+    else:
+        ticks, texts = recorded(path)
+        assert ticks == list(range(1, chunks * TICKS + 1))
+        assert len(texts) == chunks
+
+
+@pytest.mark.parametrize("chunks", range(CHUNKS + 1))
+def test_a_broken_file_is_mended_with_everything_that_was_whole(
+    cut: tuple[bytes, list[int]], tmp_path: Path, chunks: int
+) -> None:
+    whole, sizes = cut
+    path = tmp_path / "s-paper.mcap"
+    path.write_bytes(whole[: sizes[chunks] - 1 if chunks < CHUNKS else len(whole) - 1])
+    assert unfinished(tmp_path) == [path]
+    mended, messages = repair(path)
+    if chunks == 0:
+        assert (mended.name, messages) == ("s-paper.mcap.broken", 0)
+        assert list(tmp_path.iterdir()) == [mended]
+        assert mended.read_bytes() == whole[: sizes[0] - 1]
+        return
+    assert mended == path
+    assert messages == sum(1 for _ in LogReader(path))
+    assert recorded(path)[0] == list(range(1, chunks * TICKS + 1))
+    assert LogReader(path).finished
+    assert unfinished(tmp_path) == []
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_mending_a_mended_file_changes_nothing(
+    cut: tuple[bytes, list[int]], tmp_path: Path
+) -> None:
+    path = tmp_path / "s-paper.mcap"
+    path.write_bytes(cut[0][: cut[1][3]])
+    repair(path)
+    before = [(entry.topic, entry.message, entry.time_unix_ns) for entry in LogReader(path)]
+    repair(path)
+    assert [(e.topic, e.message, e.time_unix_ns) for e in LogReader(path)] == before
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"rubbish" * 100])
+def test_a_file_without_a_whole_record_is_set_aside(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    assert unfinished(tmp_path) == [path]
+    mended, messages = repair(path)
+    assert (mended.name, messages, mended.read_bytes()) == ("x.mcap.broken", 0, content)
+    assert unfinished(tmp_path) == []
+
+
+def test_mending_keeps_messages_of_others_without_schema_too(tmp_path: Path) -> None:
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("chatter", "json", 0)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.flush()
+    assert repair(path) == (path, 1)
+    assert is_finished(path)
+
+
+def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
+    cut: tuple[bytes, list[int]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "s-paper.mcap"
+    path.write_bytes(cut[0][: cut[1][3]])
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("logs.session.os.fsync", full)
+    with pytest.raises(LogError, match=r"s-paper\.mcap cannot be repaired: .*free some space"):
+        repair(path)
+    assert path.read_bytes() == cut[0][: cut[1][3]]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_a_recorder_holds_is_not_taken_for_broken(tmp_path: Path) -> None:
+    part = Part(tmp_path / "s-paper.mcap", "paper")
+    part.add_metadata("a", {})
+    part.flush()
+    assert unfinished(tmp_path) == []
+    os.close(part._file._fd)  # as when its process dies
+    assert unfinished(tmp_path) == [tmp_path / "s-paper.mcap"]
+
+
+def test_names_and_parts(tmp_path: Path) -> None:
+    assert session_name(1_795_350_943_000_000_000, "paper") == "20261122T123543Z-paper"
+    paths = [part_path(tmp_path, "s", part) for part in (0, 1, 2, 10)]
+    assert [path.name for path in paths] == ["s.mcap", "s.001.mcap", "s.002.mcap", "s.010.mcap"]
+    for path in (*paths, tmp_path / "s-2.mcap", tmp_path / "s.001.mcap.broken"):
+        path.write_bytes(b"")
+    assert parts_of(paths[0]) == paths
+    assert parts_of(paths[1]) == [paths[1]]
+
+
+@pytest.mark.parametrize("kept", range(6))
+def test_the_oldest_parts_go_first(tmp_path: Path, kept: int) -> None:
+    names = ("a.mcap", "a.001.mcap", "a.002.mcap", "b.mcap", "b.001.mcap")  # oldest first
+    magic = b"\x89MCAP0\r\n"
+    for name in names:
+        (tmp_path / name).write_bytes(magic + bytes(84) + magic)
+    deleted = delete_oldest(tmp_path, kept * 100 + 50 if kept else 1)
+    assert {path.name for path in deleted} == set(names[: 5 - kept])
+    assert {path.name for path in tmp_path.iterdir()} == set(names[5 - kept :])
+
+
+def test_nothing_is_deleted_that_is_unfinished_or_where_all_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_bytes(bytes(100))
+    assert delete_oldest(tmp_path, 1) == []
+    (tmp_path / "b.mcap").write_bytes(b"\x89MCAP0\r\n" * 2)
+    assert delete_oldest(tmp_path, 0) == []
+    assert len(list(tmp_path.iterdir())) == 2
