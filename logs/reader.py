@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from google.protobuf.message import Message
+from google.protobuf.message import DecodeError, Message
 from mcap.records import Channel
 from mcap.records import Message as McapMessage
+from mcap.well_known import MessageEncoding
 from mcap.writer import MCAP0_MAGIC
 
 from controllers.errors import LogError
@@ -65,13 +66,16 @@ class LogReader:
         for record in whole_records(part):
             if isinstance(record, Channel):
                 topic = _BY_KEY.get(split_key(record.topic)[1])
-                if topic is not None:
+                if topic is not None and record.message_encoding == MessageEncoding.Protobuf:
                     topics[record.id] = topic
             elif isinstance(record, McapMessage) and record.channel_id in topics:
                 topic = topics[record.channel_id]
                 if topic.message is not None:
                     message = topic.message()
-                    message.ParseFromString(record.data)
+                    try:
+                        message.ParseFromString(record.data)
+                    except DecodeError as error:
+                        raise LogError(f"{part} is damaged: no message at {topic.key}") from error
                     yield Entry(topic, message, record.log_time)
 
     @property

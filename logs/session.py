@@ -117,7 +117,7 @@ def _copy_records(source: Path, destination: Path) -> int:
                     )
                 case Channel() if record.id not in channels:
                     channels[record.id] = writer.register_channel(
-                        record.topic, record.message_encoding, schemas[record.schema_id]
+                        record.topic, record.message_encoding, schemas.get(record.schema_id, 0)
                     )
                 case Message():
                     writer.add_message(

@@ -17,4 +17,6 @@ def drawn_parameters(configuration: Configuration, arm: Arm) -> dict[str, float]
     """Every parameter that the simulator draws from its seed, to repeat the run."""
     from hardware.simulator.parameters import SimulatorParameters, draw
 
-    return draw(SimulatorParameters(), configuration.simulator.seed, arm.n_sections).as_dict()
+    drawn = draw(SimulatorParameters(), configuration.simulator.seed, arm.n_sections).as_dict()
+    del drawn["lowest_mode_hz"]  # follows from the others, and is known once the rod is built
+    return drawn

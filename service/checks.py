@@ -2,6 +2,7 @@
 
 import numpy as np
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from google.protobuf.message import Message
 
 from controllers.actuation import length_bounds_m
 from controllers.arm import Arm, Array
@@ -42,9 +43,11 @@ class TargetChecker:
         law = _law(message.law)
         match message.WhichOneof("target"):
             case "position":
+                _require(message.position, "position_m")
                 position = self._position(message.position.frame_id, message.position.position_m)
                 return PositionTarget(position, law)
             case "pose":
+                _require(message.pose, "position_m", "orientation")
                 position = self._position(message.pose.frame_id, message.pose.position_m)
                 return PoseTarget(position, _quaternion(message.pose.orientation), law)
             case "twist":
@@ -59,6 +62,8 @@ class TargetChecker:
 
     def tip_pose(self, message: PoseInFrame) -> tuple[Array, Array]:
         """Check a measured tip pose; return position (3,) and quaternion (4,)."""
+        _require(message, "pose")
+        _require(message.pose, "position", "orientation")
         position = self._position(message.frame_id, message.pose.position)
         return position, _quaternion(message.pose.orientation)
 
@@ -119,6 +124,7 @@ def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:
         raise TargetRejected(
             f"reference_point = {message.reference_point!r}; allowed: 'base', 'tip'"
         )
+    _require(message, "linear_m_s")
     linear = _vector("linear_m_s", message.linear_m_s)
     if np.linalg.norm(linear) > FASTEST_M_S:
         raise TargetRejected(
@@ -139,6 +145,13 @@ def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:
     if in_tip_frame and about_base:
         raise TargetRejected("frame_id = 'tip' goes with reference_point = 'tip' only")
     return TwistTarget(linear, angular, in_tip_frame, about_base, law)
+
+
+def _require(message: Message, *names: str) -> None:
+    """Refuse a message that leaves a field out: protobuf would read it as zeros."""
+    for name in names:
+        if not message.HasField(name):
+            raise TargetRejected(f"{name} is missing")
 
 
 def _check_frame(frame_id: str, allowed: tuple[str, ...]) -> None:

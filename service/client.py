@@ -10,7 +10,7 @@ import time
 import uuid
 from collections.abc import Iterator
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import zenoh
 from google.protobuf.message import Message
@@ -31,6 +31,13 @@ from service.target_messages import Vector, pose_target, position_target, twist_
 
 _QUERY_S = 2.0
 _REFRESH_S = 0.02
+
+#: A stop is sent before everything else, and waits for room rather than being dropped.
+_URGENT: dict[str, Any] = {
+    "priority": zenoh.Priority.REAL_TIME,
+    "congestion_control": zenoh.CongestionControl.BLOCK,
+    "express": True,
+}
 
 M = TypeVar("M", bound=Message)
 
@@ -56,6 +63,7 @@ class Client:
         self._sequence = 0
         self._newest: pb.ArmState | None = None
         self._received_s = 0.0
+        self._awaited = 0  # number of the tick that a mode reply spoke of
         self._declare(connect)
 
     def _declare(self, connect: str) -> None:
@@ -108,13 +116,15 @@ class Client:
     # --- what the arm does -----------------------------------------------------------------
 
     def state(self, timeout_s: float = 2.0) -> pb.ArmState:
-        """Return the newest state; raises DaemonUnreachable if none comes in time."""
+        """Return the newest state, one from after the last mode change that this client asked for.
+
+        Raises DaemonUnreachable if none comes in time.
+        """
         waited_until = time.monotonic() + timeout_s
         while True:
             sample = self._states.try_recv()
             if sample is not None:
-                self._newest = pb.ArmState.FromString(sample.payload.to_bytes())
-                self._received_s = time.monotonic()
+                self._take(pb.ArmState.FromString(sample.payload.to_bytes()))
             elif self._newest is not None and self._fresh():
                 return self._newest
             elif time.monotonic() > waited_until:
@@ -122,7 +132,14 @@ class Client:
             else:
                 time.sleep(0.001)
 
+    def _take(self, state: pb.ArmState) -> None:
+        if self._newest is not None and state.sequence < self._newest.sequence:
+            self._awaited = 0  # another daemon has started to count
+        self._newest, self._received_s = state, time.monotonic()
+
     def _fresh(self) -> bool:
+        if self._newest is None or self._newest.sequence < self._awaited:
+            return False
         return time.monotonic() - self._received_s < 0.1
 
     def states(self) -> Iterator[pb.ArmState]:
@@ -173,7 +190,15 @@ class Client:
         if not reply.accepted:
             held_by_other = reply.lease_holder not in ("", self.client_id)
             raise (LeaseRefused if held_by_other else ModeRefused)(reply.reason)
+        self._awaited = reply.state_sequence
+        self._wait_for(reply.state_sequence)
         return reply
+
+    def _wait_for(self, sequence: int) -> None:
+        """Wait until the states that arrive show what a reply has told."""
+        waited_until = time.monotonic() + _QUERY_S
+        while self.state().sequence < sequence and time.monotonic() < waited_until:
+            time.sleep(0.002)
 
     def enable(self, take_over: bool = False, timeout_s: float = 3.0) -> pb.Reply:
         """Take the lease and arm; waits while the chambers are still venting.
@@ -209,7 +234,7 @@ class Client:
 
     def estop(self, timeout_s: float = 1.0) -> pb.ArmState:
         """Stop; return the state that shows it, or raise NotConfirmed."""
-        self._session.put(self._key(ESTOP), b"estop", priority=zenoh.Priority.REAL_TIME)
+        self._session.put(self._key(ESTOP), b"estop", **_URGENT)
         waited_until = time.monotonic() + timeout_s
         with contextlib.suppress(DaemonUnreachable):
             while time.monotonic() < waited_until:

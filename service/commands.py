@@ -82,9 +82,16 @@ class Pipe:
         self._socket.setblocking(False)
 
     def send(self, message: Command | ModeReply) -> bool:
-        """Send without waiting; returns False, and counts, if the other side does not read."""
+        """Send without waiting; returns False, and counts, if the other side does not read.
+
+        What is longer than one datagram may be is not sent either: it would arrive cut off.
+        """
+        data = pickle.dumps(message)
+        if len(data) > _LARGEST:
+            self.dropped += 1
+            return False
         try:
-            self._socket.send(pickle.dumps(message))
+            self._socket.send(data)
         except OSError:
             self.dropped += 1
             return False

@@ -1,6 +1,9 @@
 """`pneuarm run` and `pneuarm config`."""
 
 import argparse
+import contextlib
+import queue
+import threading
 
 from service.config import load, rerun_url
 
@@ -13,11 +16,36 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.viewer:
         rerun = configuration.rerun.model_copy(update={"open_viewer": True})
         configuration = configuration.model_copy(update={"rerun": rerun})
-    return Supervisor(configuration, _say).run()
+    terminal = Terminal()
+    try:
+        return Supervisor(configuration, terminal.say).run()
+    finally:
+        terminal.close()
 
 
-def _say(line: str) -> None:
-    print(line, flush=True)
+class Terminal:
+    """Prints from a thread of its own: a terminal that is paused must not stop the supervisor."""
+
+    def __init__(self) -> None:
+        self._lines: queue.Queue[str | None] = queue.Queue(1000)
+        self._thread = threading.Thread(target=self._print, daemon=True)
+        self._thread.start()
+
+    def say(self, line: str) -> None:
+        """Print a line soon; a terminal that is 1000 lines behind gets no more."""
+        with contextlib.suppress(queue.Full):
+            self._lines.put_nowait(line)
+
+    def _print(self) -> None:
+        with contextlib.suppress(OSError):
+            while (line := self._lines.get()) is not None:
+                print(line, flush=True)
+
+    def close(self) -> None:
+        """Give what is left a second to appear."""
+        with contextlib.suppress(queue.Full):
+            self._lines.put_nowait(None)
+        self._thread.join(1.0)
 
 
 def config(arguments: argparse.Namespace) -> int:

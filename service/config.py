@@ -24,13 +24,17 @@ PRESETS = ("paper", "table1", "trunk")
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-MM, BAR, MS = 1e-3, 1e5, 1e-3
+Endpoint = Annotated[
+    str, Field(pattern=r"^(tcp|tls|udp|quic|ws|unixsock-stream|unixpipe|serial|vsock)/[^\s]+$")
+]
+
+MM, BAR = 1e-3, 1e5
 
 
 class _Table(BaseModel):
     """A table of the file: unknown keys are errors, values are never changed afterwards."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class SectionConfig(_Table):
@@ -79,8 +83,8 @@ class ArmConfig(_Table):
     """The arm: its name on the wire, gravity in its base frame, its sections from the base on."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
-    gravity_m_s2: tuple[Finite, Finite, Finite]
-    sections: Annotated[tuple[SectionConfig, ...], Field(min_length=1, max_length=16)]
+    gravity_m_s2: Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
+    sections: Annotated[tuple[SectionConfig, ...], Field(min_length=1, max_length=16, strict=False)]
 
 
 class ControlConfig(_Table):
@@ -124,7 +128,9 @@ class SimulatorConfig(_Table):
 class ZenohConfig(_Table):
     """Where the daemon listens; a Zenoh file goes first and may bring TLS and access control."""
 
-    listen: Annotated[tuple[str, ...], Field(min_length=1)] = ("tcp/127.0.0.1:7447",)
+    listen: Annotated[tuple[Endpoint, ...], Field(min_length=1, strict=False)] = (
+        "tcp/127.0.0.1:7447",
+    )
     config_file: str = ""
 
 

@@ -21,14 +21,17 @@ from service.process import Shared, ignore_terminal_signals
 
 #: How long the loop goes on venting after it was told to end, at most.
 VENT_BEFORE_END_S = 2.0
+
+#: From each pipe; a flood of targets delays nobody else's request.
 _COMMANDS_PER_TICK = 16
 
 
 class ControlProcess:
     """Runs the loop until the supervisor says to end, or is gone."""
 
-    def __init__(self, shared: Shared, gateway: Pipe, supervisor: Pipe) -> None:
-        self._shared, self._gateway, self._supervisor = shared, gateway, supervisor
+    def __init__(self, shared: Shared, supervisor: Pipe, requests: Pipe, stream: Pipe) -> None:
+        self._shared, self._supervisor = shared, supervisor
+        self._requests, self._stream = requests, stream
         configuration = shared.configuration
         control = configuration.control
         arm = configuration.build_arm()
@@ -89,13 +92,13 @@ class ControlProcess:
 
     def _reply(self, reply: ModeReply) -> None:
         """Answer whoever asked: even numbers are the gateway's, odd ones the supervisor's."""
-        pipe = self._supervisor if reply.request_id % 2 else self._gateway
+        pipe = self._supervisor if reply.request_id % 2 else self._requests
         pipe.send(reply)
 
     def _receive(self, now_ns: int) -> list[Command]:
         """Take what has arrived; once the end has begun nothing counts any more."""
         commands: list[Command] = []
-        for pipe in (self._supervisor, self._gateway):
+        for pipe in (self._supervisor, self._requests, self._stream):
             for _ in range(_COMMANDS_PER_TICK):
                 message = pipe.receive()
                 if message is None:
@@ -133,7 +136,8 @@ class ControlProcess:
 def main(
     shared: Shared,
     supervisor: Pipe,
-    gateway: Pipe,
+    requests: Pipe,
+    stream: Pipe,
     arm_lock: socket.socket,
     device_lock: socket.socket,
     end: Connection,
@@ -144,4 +148,4 @@ def main(
     order to end comes through the supervisor's pipe, not through ``end``.
     """
     ignore_terminal_signals()
-    ControlProcess(shared, gateway, supervisor).run()
+    ControlProcess(shared, supervisor, requests, stream).run()

@@ -2,6 +2,8 @@
 
 import argparse
 import json
+import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -159,10 +161,19 @@ def table(figures: Figures) -> str:
         row("log", f"{figures.log_bytes / 1e6:.1f} MB", figures.log),
         "",
         "see it again:",
-        f"  pneuarm replay {figures.log}",
-        f"  rerun {figures.log}",
+        f"  {_program('pneuarm')} replay {figures.log}",
+        f"  {_program('rerun')} {figures.log}",
     ]
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _program(name: str) -> str:
+    """Return how to call a program of this environment from here."""
+    own = Path(sys.executable).with_name(name)
+    found = shutil.which(name)
+    if found is not None and Path(found).samefile(own):
+        return name
+    return os.path.relpath(own)
 
 
 def _tail(latency: dict[str, float]) -> str:

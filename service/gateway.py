@@ -5,6 +5,7 @@ on; nothing in them waits, so that a stop behind them is never delayed.
 """
 
 import os
+import secrets
 import select
 import threading
 import time
@@ -44,6 +45,9 @@ _PERIOD_S = 0.01
 _HEARTBEAT_S = 0.05
 _SHOWN_PAYLOAD_BYTES = 200
 
+#: A client may have seen states that this process has not read from the ring yet.
+_AHEAD_TICKS = 1000
+
 _EVENTS = {
     pb.ENABLE: ModeEvent.ENABLE,
     pb.HOLD_NOW: ModeEvent.HOLD,
@@ -55,9 +59,13 @@ _EVENTS = {
 class Gateway:
     """Checks what comes in, answers queries, publishes what the ring holds."""
 
-    def __init__(self, shared: Shared, pipe: Pipe, session: zenoh.Session) -> None:
+    def __init__(
+        self, shared: Shared, requests: Pipe, stream: Pipe, session: zenoh.Session
+    ) -> None:
         control = shared.configuration.control
-        self._shared, self._pipe, self._session = shared, pipe, session
+        self._shared, self._session = shared, session
+        # A stop never queues behind targets or poses: those have a pipe of their own.
+        self._requests, self._stream = requests, stream
         self._arm = shared.configuration.build_arm()
         self._checker = TargetChecker(self._arm)
         self._lease = Lease(control.lease_timeout_s)
@@ -65,7 +73,8 @@ class Gateway:
         self._publisher = Publisher(shared, self._arm, session)
         self._lock = threading.RLock()
         self._pending: dict[int, tuple[zenoh.Query, str, str]] = {}
-        self._request_id = 0
+        self._request_id = 2 * secrets.randbelow(2**40)  # no reply to a dead gateway matches
+        self._stop_asked = False
         self._rejected = 0
         self._stale_s = control.target_timeout_ms * 1e-3
         self._declared = self._declare()
@@ -98,7 +107,8 @@ class Gateway:
                 self._lease.check_target(
                     message.client_id, message.lease_secret, message.sequence, received_ns * 1e-9
                 )
-            self._pipe.send(SetTarget(target, message.sequence, received_ns))
+                self._check_active()
+            self._stream.send(SetTarget(target, message.sequence, received_ns))
         except TargetRejected as error:
             self._reject(TARGET.key, str(error), payload, message.client_id)
             return
@@ -108,11 +118,23 @@ class Gateway:
     def _check_fresh(self, state_sequence: int) -> None:
         newest = self._publisher.newest_sequence
         age_s = (newest - state_sequence) / self._shared.configuration.control.rate_hz
-        if state_sequence > newest + 1000 or age_s > self._stale_s:
+        if state_sequence > newest + _AHEAD_TICKS:
+            raise TargetRejected(
+                f"state_sequence = {state_sequence}, but the arm is only at {newest}; repeat the "
+                "number of the newest `state` that was received"
+            )
+        if age_s > self._stale_s:
             raise TargetRejected(
                 f"state_sequence = {state_sequence} while the arm is at {newest}: the sender has "
                 f"not seen a state for {age_s:.3g} s (allowed: {self._stale_s:g} s); its network "
                 "is stalled, or it does not read `state`"
+            )
+
+    def _check_active(self) -> None:
+        mode = self._publisher.newest_mode
+        if mode != pb.ACTIVE:
+            raise TargetRejected(
+                f"the arm is in mode {pb.Mode.Name(mode).lower()} and follows no target; enable it"
             )
 
     def _on_tip_pose(self, sample: zenoh.Sample) -> None:
@@ -124,11 +146,12 @@ class Gateway:
         except TargetRejected as error:
             self._reject(TIP_POSE.key, str(error), payload, "")
             return
-        self._pipe.send(SetTipPose(position, quaternion, received_ns))
+        self._stream.send(SetTipPose(position, quaternion, received_ns))
         self._log(TIP_POSE, message, received_ns)
 
     def _on_estop(self, sample: zenoh.Sample) -> None:
-        """Stop, whatever was sent and whoever sent it."""
+        """Stop, whatever was sent and whoever sent it; asked again until a state shows it."""
+        self._stop_asked = True
         self._request(ModeEvent.ESTOP, "a client")
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
@@ -161,6 +184,10 @@ class Gateway:
     def _handle(self, request: pb.ModeRequest, query: zenoh.Query, encoding: str) -> None:
         now_s = time.monotonic()
         secret = request.lease_secret
+        if len(request.client_id) > 64:
+            raise TargetRejected(
+                f"client_id has {len(request.client_id)} characters; at most 64 are allowed"
+            )
         with self._lock:
             if request.action in (pb.ENABLE, pb.TAKE_LEASE):
                 secret, taken = self._lease.take(
@@ -177,7 +204,8 @@ class Gateway:
         elif request.action in (pb.TAKE_LEASE, pb.RELEASE_LEASE):
             self._reply(query, self._state_reply(True, "", secret), encoding)
         else:
-            raise TargetRejected("action is missing; one of " + ", ".join(pb.Action.keys()[1:]))
+            names = ", ".join(pb.Action.keys()[1:])
+            raise TargetRejected(f"action = {request.action}: missing or unknown; one of {names}")
 
     def _request(
         self, event: ModeEvent, client: str, asked: tuple[zenoh.Query, str, str] | None = None
@@ -187,7 +215,7 @@ class Gateway:
             self._request_id += 2  # even: the gateway's
             if asked is not None:
                 self._pending[self._request_id] = asked
-            sent = self._pipe.send(RequestMode(event, self._request_id, client))
+            sent = self._requests.send(RequestMode(event, self._request_id, client))
             if not sent and asked is not None:
                 del self._pending[self._request_id]
         if not sent and asked is not None:
@@ -219,6 +247,7 @@ class Gateway:
         message = self._state_reply(reply.accepted, reply.reason, secret)
         message.mode = cast("pb.Mode", int(reply.mode))
         message.state_sequence = reply.sequence
+        self._publisher.newest_mode = message.mode
         self._reply(query, message, encoding)
 
     # --- what goes out ---------------------------------------------------------------------
@@ -237,7 +266,7 @@ class Gateway:
             text=f"{key}: {reason}"[:400],
             client_id=client[:64],
             mode=self._publisher.newest_mode,
-            payload=payload[:_SHOWN_PAYLOAD_BYTES],
+            payload=self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES],
         )
         with self._lock:
             self._rejected += 1
@@ -248,36 +277,51 @@ class Gateway:
         heartbeat_s = 0.0
         next_s = time.monotonic()
         while parent_is_alive() and not end.poll():
+            self._insist_on_stop()
             next_s = max(next_s + _PERIOD_S, time.monotonic())
             self._answer_until(next_s)
             now_s = time.monotonic()
             if now_s - heartbeat_s >= _HEARTBEAT_S:
                 heartbeat_s = now_s
-                self._pipe.send(Heartbeat(operator=bool(self._lease.holder)))
+                self._requests.send(Heartbeat(operator=self._lease.has_operator(now_s)))
             for health in self._publisher.step(
-                now_s, self._rejected, self._pipe.dropped, self._lease.holder
+                now_s,
+                self._rejected,
+                self._requests.dropped + self._stream.dropped,
+                self._lease.holder,
             ):
                 self._log(HEALTH, health, time.monotonic_ns())
+
+    def _insist_on_stop(self) -> None:
+        """Repeat a stop that no state shows yet, should its message have been lost."""
+        if not self._stop_asked:
+            return
+        if self._publisher.newest_mode == pb.ESTOP:
+            self._stop_asked = False
+        else:
+            self._request(ModeEvent.ESTOP, "a client")
 
     def _answer_until(self, until_s: float) -> None:
         """Pass control's replies on as they come, until it is time to publish."""
         while (remaining := until_s - time.monotonic()) > 0:
-            readable, _, _ = select.select([self._pipe], [], [], remaining)
-            while readable and (message := self._pipe.receive()) is not None:
+            readable, _, _ = select.select([self._requests], [], [], remaining)
+            while readable and (message := self._requests.receive()) is not None:
                 if isinstance(message, ModeReply):
                     self._answer(message)
-            if self._pipe.closed:  # control has ended; the last states are still to be published
+            if (
+                self._requests.closed
+            ):  # control has ended; the last states are still to be published
                 time.sleep(max(0.0, until_s - time.monotonic()))
                 return
 
 
-def main(shared: Shared, pipe: Pipe, end: Connection) -> None:
+def main(shared: Shared, requests: Pipe, stream: Pipe, end: Connection) -> None:
     """Entry point of the process; ends when told through ``end``, or when its parent is gone."""
     ignore_terminal_signals()
     zenoh_config = shared.configuration.zenoh
     session = network.open_listening(zenoh_config.listen, zenoh_config.config_file)
     try:
-        Gateway(shared, pipe, session).run(end)
+        Gateway(shared, requests, stream, session).run(end)
     finally:
         session.close()
         os._exit(0)  # Zenoh's threads may keep a Python process from ending

@@ -26,6 +26,18 @@ class Lease:
         """Client that holds the lease, or an empty string."""
         return "" if self._holder is None else self._holder.client
 
+    def redacted(self, payload: bytes) -> bytes:
+        """Return a payload without the secret, for an event that everybody may read."""
+        held = self._holder
+        if held is None:
+            return payload
+        return payload.replace(held.secret.encode(), b"*" * len(held.secret))
+
+    def has_operator(self, now_s: float) -> bool:
+        """Whether somebody holds the lease and was heard within its timeout."""
+        held = self._holder
+        return held is not None and now_s - held.heard_s <= self._timeout_s
+
     def take(self, client: str, secret: str, take_over: bool, now_s: float) -> tuple[str, bool]:
         """Grant the lease; return its secret, and whether it was taken from somebody else.
 

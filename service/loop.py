@@ -188,8 +188,11 @@ class Loop:
 
     def _request(self, request: RequestMode, now_s: float) -> ModeReply:
         before = self._keeper.mode
-        if request.event == ModeEvent.LEASE_RELEASED and self._target is None:
-            reason = ""  # armed without a target yet: the next operator may go on
+        if request.event in (ModeEvent.LEASE_LOST, ModeEvent.LEASE_RELEASED):
+            # Released before a first target: the arm stays armed for the next operator.
+            if request.event == ModeEvent.LEASE_LOST or self._target is not None:
+                self._keeper.apply(request.event, now_s, request.client)
+            reason = ""
         else:
             reason = self._keeper.request(request.event, now_s, request.client)
         if before != Mode.ACTIVE and self._keeper.mode == Mode.ACTIVE:

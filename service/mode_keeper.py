@@ -58,7 +58,7 @@ _TEXTS: dict[ModeEvent, tuple[str, str, str]] = {
         "the gateway is silent: nobody could stop the arm over the network",
         "it is started again by itself; then enable again",
     ),
-    ModeEvent.GATEWAY_LOST: ("the arm vents", "the gateway stays silent", "look at its log"),
+    ModeEvent.GATEWAY_LOST: ("the arm vents", "the gateway stays silent", "start the daemon again"),
     ModeEvent.DISK_FULL: (
         "the arm holds",
         "the disk takes no more of the log",

@@ -19,7 +19,8 @@ def is_loopback(endpoint: str) -> bool:
     return address.startswith(_LOOPBACK) or endpoint.startswith("unixsock")
 
 
-def _config(config_file: str) -> zenoh.Config:
+def read_config(config_file: str) -> zenoh.Config:
+    """Read a Zenoh configuration file, or the defaults; raises ConfigurationError."""
     if not config_file:
         return zenoh.Config()
     if not Path(config_file).is_file():
@@ -52,7 +53,7 @@ def check_free(key: str, endpoint: str) -> None:
 
 def open_listening(listen: Sequence[str], config_file: str) -> zenoh.Session:
     """Open the daemon's session; raises ConfigurationError if it cannot listen there."""
-    config = _config(config_file)
+    config = read_config(config_file)
     config.insert_json5("mode", '"router"')
     config.insert_json5("listen/endpoints", json.dumps(list(listen)))
     config.insert_json5("listen/exit_on_failure", "true")
@@ -72,10 +73,12 @@ def open_listening(listen: Sequence[str], config_file: str) -> zenoh.Session:
 
 def open_connected(endpoint: str, config_file: str = "") -> zenoh.Session:
     """Open a client's session; raises DaemonUnreachable if nobody answers there."""
-    config = _config(config_file)
+    config = read_config(config_file)
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     config.insert_json5("scouting/multicast/enabled", "false")
+    # A daemon that stands still takes the connection and says nothing; who stops waits for this.
+    config.insert_json5("transport/unicast/open_timeout", "2000")
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:

@@ -1,9 +1,11 @@
 """The supervisor: starts, watches and ends the processes, and can vent the device by itself."""
 
+import contextlib
 import os
 import select
 import signal
 import socket
+import tempfile
 import time
 from collections.abc import Callable
 from multiprocessing import get_context
@@ -23,7 +25,7 @@ from service.config import Configuration, log_directory
 from service.facts import info_of
 from service.local_stop import lock
 from service.mode import ModeEvent
-from service.network import check_free
+from service.network import check_free, read_config
 from service.process import Shared
 from service.repairing import start_mending
 from service.usage import ProcessTable
@@ -57,7 +59,8 @@ class Supervisor:
         self._announcer = Announcer(self._shared.rings, say)
         self._ticks = RingReader(self._shared.rings.ticks)
         self._control_pipe, self._control_end = new_pipe()
-        self._gateway_pipe, self._gateway_end = new_pipe()
+        self._requests = new_pipe()
+        self._stream = new_pipe()
         self._children: dict[str, Child] = {}
         self._stop_asked: dict[int, socket.socket] = {}
         self._request_id = 1
@@ -65,6 +68,7 @@ class Supervisor:
 
     @staticmethod
     def _check_ports(configuration: Configuration) -> None:
+        read_config(configuration.zenoh.config_file)
         for endpoint in configuration.zenoh.listen:
             check_free("zenoh.listen", endpoint)
         if configuration.rerun.enabled:
@@ -74,9 +78,11 @@ class Supervisor:
     def _make_directory(self) -> None:
         try:
             self._directory.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=self._directory).close()
         except OSError as error:
             raise ConfigurationError(
-                f"log.directory: {self._directory} cannot be made ({error.strerror})"
+                f"log.directory: {self._directory} cannot be written to ({error.strerror}); name "
+                "a folder that this user may write to"
             ) from error
 
     def _share(self, configuration: Configuration) -> Shared:
@@ -129,8 +135,10 @@ class Supervisor:
 
     def _start_control(self) -> None:
         """Start control alone, so that nothing delays its first tick, and wait for that."""
-        locks = (self._arm_lock, self._device_lock)
-        control = self._add("control", (self._shared, self._control_end, self._gateway_end, *locks))
+        shared, locks = self._shared, (self._arm_lock, self._device_lock)
+        control = self._add(
+            "control", (shared, self._control_end, self._requests[1], self._stream[1], *locks)
+        )
         give_up_s = time.monotonic() + _FIRST_TICK_S
         while not self._ending and control.is_alive() and self._ticks.head() == 0:
             if time.monotonic() > give_up_s:
@@ -147,7 +155,7 @@ class Supervisor:
 
     def _start_others(self) -> None:
         shared = self._shared
-        self._add("gateway", (shared, self._gateway_pipe))
+        self._add("gateway", (shared, self._requests[0], self._stream[0]))
         self._add("recorder", (shared,))
         if shared.configuration.rerun.enabled:
             self._add("viewer", (shared,))
@@ -239,7 +247,7 @@ class Supervisor:
     def _confirm(self, reply: ModeReply) -> None:
         connection = self._stop_asked.pop(reply.request_id, None)
         if connection is not None:
-            with connection:
+            with connection, contextlib.suppress(OSError):  # whoever asked may have gone
                 connection.sendall(b"stopped\n" if reply.accepted else b"refused\n")
 
     # --- the end ---------------------------------------------------------------------------

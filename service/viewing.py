@@ -44,6 +44,7 @@ def start_server(configuration: Configuration) -> "subprocess.Popen[bytes]":
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         preexec_fn=_die_with_parent,
+        start_new_session=True,  # Ctrl-C is for the supervisor; the server goes after its viewer
     )
 
 

@@ -1,13 +1,14 @@
 """Session files: names, parts, what a crash leaves, and mending it."""
 
 import os
-from collections.abc import Iterator
+import struct
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.writer import Writer
+from mcap.writer import MCAP0_MAGIC, Writer
 
 from controllers.errors import LogError
 from logs.part import Part
@@ -25,42 +26,58 @@ from tests.logs.recording import make_session, recorded
 
 CHUNKS = 8
 TICKS = 60  # a chunk
+CHUNK = 6  # kind of record
+
+
+@dataclass(frozen=True, repr=False)
+class Whole:
+    """A finished session file, and where each of its chunks ends."""
+
+    content: bytes
+    ends: list[int]
+
+    def chunks_within(self, size: int) -> int:
+        return sum(end <= size for end in self.ends)
+
+
+def chunk_ends(content: bytes) -> list[int]:
+    """Walk the records of an MCAP file: one byte of kind, eight of length, the rest."""
+    ends, position = [], len(MCAP0_MAGIC)
+    while position < len(content) - len(MCAP0_MAGIC):
+        kind, length = struct.unpack_from("<BQ", content, position)
+        position += 9 + length
+        if kind == CHUNK:
+            ends.append(position)
+    return ends
 
 
 @pytest.fixture(scope="module")
-def cut(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[bytes, list[int]]]:
-    """A finished session file, and its size after each flush."""
-    directory = tmp_path_factory.mktemp("whole")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     with pytest.MonkeyPatch.context() as patch:
-        session = make_session(directory, patch)
+        session = make_session(tmp_path_factory.mktemp("whole"), patch)
         recorder = session.recorder()
-        sizes = []
         for _ in range(CHUNKS):
             session.write_ticks(TICKS)
             session.write_events(1)
             session.flush(recorder)
-            sizes.append(session.path.stat().st_size)
         recorder.finish()
-    yield session.path.read_bytes(), sizes
-
-
-def chunks_within(size: int, sizes: list[int]) -> int:
-    return sum(flushed <= size for flushed in sizes)
+    content = session.path.read_bytes()
+    ends = chunk_ends(content)
+    assert len(ends) == CHUNKS
+    return Whole(content, ends)
 
 
 @given(share=st.floats(0, 1), near=st.integers(-9, 9))
 def test_a_file_cut_anywhere_is_readable_up_to_its_last_whole_chunk(
-    cut: tuple[bytes, list[int]],
-    tmp_path_factory: pytest.TempPathFactory,
-    share: float,
-    near: int,
+    whole: Whole, tmp_path_factory: pytest.TempPathFactory, share: float, near: int
 ) -> None:
-    whole, sizes = cut
     # Half of the cuts fall close to the end of a chunk, where the mistakes are.
-    size = int(share * len(whole)) if near % 2 else sizes[int(share * (CHUNKS - 1))] + near
+    size = int(share * len(whole.content))
+    if near % 2:
+        size = whole.ends[int(share * (CHUNKS - 1))] + near
     path = tmp_path_factory.mktemp("cut") / "cut.mcap"
-    path.write_bytes(whole[:size])
-    chunks = chunks_within(size, sizes)
+    path.write_bytes(whole.content[:size])
+    chunks = whole.chunks_within(size)
     if chunks == 0:
         with pytest.raises(LogError):
             LogReader(path)
@@ -72,17 +89,17 @@ def test_a_file_cut_anywhere_is_readable_up_to_its_last_whole_chunk(
 
 @pytest.mark.parametrize("chunks", range(CHUNKS + 1))
 def test_a_broken_file_is_mended_with_everything_that_was_whole(
-    cut: tuple[bytes, list[int]], tmp_path: Path, chunks: int
+    whole: Whole, tmp_path: Path, chunks: int
 ) -> None:
-    whole, sizes = cut
     path = tmp_path / "s-paper.mcap"
-    path.write_bytes(whole[: sizes[chunks] - 1 if chunks < CHUNKS else len(whole) - 1])
+    end = whole.ends[chunks] if chunks < CHUNKS else len(whole.content)
+    path.write_bytes(whole.content[: end - 1])
     assert unfinished(tmp_path) == [path]
     mended, messages = repair(path)
     if chunks == 0:
         assert (mended.name, messages) == ("s-paper.mcap.broken", 0)
         assert list(tmp_path.iterdir()) == [mended]
-        assert mended.read_bytes() == whole[: sizes[0] - 1]
+        assert mended.read_bytes() == whole.content[: end - 1]
         return
     assert mended == path
     assert messages == sum(1 for _ in LogReader(path))
@@ -92,11 +109,9 @@ def test_a_broken_file_is_mended_with_everything_that_was_whole(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_mending_a_mended_file_changes_nothing(
-    cut: tuple[bytes, list[int]], tmp_path: Path
-) -> None:
+def test_mending_a_mended_file_changes_nothing(whole: Whole, tmp_path: Path) -> None:
     path = tmp_path / "s-paper.mcap"
-    path.write_bytes(cut[0][: cut[1][3]])
+    path.write_bytes(whole.content[: whole.ends[3]])
     repair(path)
     before = [(entry.topic, entry.message, entry.time_unix_ns) for entry in LogReader(path)]
     repair(path)
@@ -126,10 +141,10 @@ def test_mending_keeps_messages_of_others_without_schema_too(tmp_path: Path) -> 
 
 
 def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
-    cut: tuple[bytes, list[int]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole: Whole, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "s-paper.mcap"
-    path.write_bytes(cut[0][: cut[1][3]])
+    path.write_bytes(whole.content[: whole.ends[3]])
 
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
@@ -137,7 +152,7 @@ def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
     monkeypatch.setattr("logs.session.os.fsync", full)
     with pytest.raises(LogError, match=r"s-paper\.mcap cannot be repaired: .*free some space"):
         repair(path)
-    assert path.read_bytes() == cut[0][: cut[1][3]]
+    assert path.read_bytes() == whole.content[: whole.ends[3]]
     assert list(tmp_path.iterdir()) == [path]
 
 

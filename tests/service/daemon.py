@@ -5,6 +5,7 @@ other daemons, and beside each other.
 """
 
 import itertools
+import math
 import os
 import signal
 import socket
@@ -187,7 +188,16 @@ class Daemon:
 
     def log(self) -> LogReader:
         """Open the newest session."""
-        return LogReader(max(path for path in self.logs.glob("*Z-*.mcap") if _is_first(path)))
+        return LogReader(max(path for path in self.logs.glob("*.mcap") if "." not in path.stem))
+
+    def events(self) -> list[pb.Event]:
+        """Return the events that the newest session holds, in the order of their time."""
+        found = [entry.message for entry in self.log() if isinstance(entry.message, pb.Event)]
+        return sorted(found, key=lambda event: event.time_unix_ns)
+
+    def codes(self) -> list[str]:
+        """Return the codes of the events in the newest session."""
+        return [event.code for event in self.events()]
 
     def __enter__(self) -> "Daemon":
         """Start."""
@@ -202,8 +212,22 @@ class Daemon:
             self.kill()
 
 
-def _is_first(path: Path) -> bool:
-    return not path.stem[-3:].isdigit() or path.stem[-4] != "."
+def keep_moving(client: Client, until: Callable[[], T], what: str) -> T:
+    """Refresh a target, a slow circle, until something is true; the arm is active all the time."""
+
+    def moved() -> T:
+        turn = 2.0 * math.pi * (time.monotonic() % 4.0) / 4.0
+        client.send_position((0.03 * math.cos(turn), 0.03 * math.sin(turn), 0.2))
+        assert client.state().mode == pb.ACTIVE, client.events()
+        return until()
+
+    return wait_for(moved, what)
+
+
+def enough(seconds: float) -> Callable[[], bool]:
+    """Return a condition that is true after some seconds, for what is to go on for a while."""
+    until_s = time.monotonic() + seconds
+    return lambda: time.monotonic() > until_s
 
 
 def health_of(client: Client) -> pb.Health:
