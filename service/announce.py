@@ -42,7 +42,7 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
 
 
 class Announcer:
-    """Prints events as they come, at most _LINES_PER_S a second."""
+    """Prints events as they come, at most _LINES_PER_S a second; errors always."""
 
     def __init__(self, rings: Rings, say: Callable[[str], None]) -> None:
         self._reader = MessageReader(rings.messages())
@@ -64,7 +64,7 @@ class Announcer:
                 self._say(f"({self._withheld} more events; all of them are in the log)")
             self._second, self._lines, self._withheld = second, 0, 0
         self._lines += 1
-        if self._lines > _LINES_PER_S:
+        if self._lines > _LINES_PER_S and event.level != pb.ERROR:
             self._withheld += 1
         else:
             self._say(event_line(event))

@@ -63,7 +63,6 @@ class Client:
         self._sequence = 0
         self._newest: pb.ArmState | None = None
         self._received_s = 0.0
-        self._awaited = 0  # number of the tick that a mode reply spoke of
         self._declare(connect)
 
     def _declare(self, connect: str) -> None:
@@ -116,15 +115,13 @@ class Client:
     # --- what the arm does -----------------------------------------------------------------
 
     def state(self, timeout_s: float = 2.0) -> pb.ArmState:
-        """Return the newest state, one from after the last mode change that this client asked for.
-
-        Raises DaemonUnreachable if none comes in time.
-        """
+        """Return the newest state; raises DaemonUnreachable if none comes in time."""
         waited_until = time.monotonic() + timeout_s
         while True:
             sample = self._states.try_recv()
             if sample is not None:
-                self._take(pb.ArmState.FromString(sample.payload.to_bytes()))
+                self._newest = pb.ArmState.FromString(sample.payload.to_bytes())
+                self._received_s = time.monotonic()
             elif self._newest is not None and self._fresh():
                 return self._newest
             elif time.monotonic() > waited_until:
@@ -132,14 +129,7 @@ class Client:
             else:
                 time.sleep(0.001)
 
-    def _take(self, state: pb.ArmState) -> None:
-        if self._newest is not None and state.sequence < self._newest.sequence:
-            self._awaited = 0  # another daemon has started to count
-        self._newest, self._received_s = state, time.monotonic()
-
     def _fresh(self) -> bool:
-        if self._newest is None or self._newest.sequence < self._awaited:
-            return False
         return time.monotonic() - self._received_s < 0.1
 
     def states(self) -> Iterator[pb.ArmState]:
@@ -190,7 +180,6 @@ class Client:
         if not reply.accepted:
             held_by_other = reply.lease_holder not in ("", self.client_id)
             raise (LeaseRefused if held_by_other else ModeRefused)(reply.reason)
-        self._awaited = reply.state_sequence
         self._wait_for(reply.state_sequence)
         return reply
 

@@ -116,7 +116,7 @@ class HardwareConfig(_Table):
     """The device that moves the air. ``device`` empty means one simulator an arm."""
 
     adapter: Literal["simulator"] = "simulator"
-    device: Annotated[str, Field(max_length=64)] = ""
+    device: Annotated[str, Field(max_length=64, pattern=r"^[\x20-\x7e]*$")] = ""
 
 
 class SimulatorConfig(_Table):

@@ -52,14 +52,13 @@ def stop_locally(arm_name: str) -> None:
         connection.settimeout(_CONFIRM_S)
         try:
             connection.connect(_address("arm", arm_name))
-        except OSError as error:
+            connection.sendall(b"estop\n")
+            answer = connection.recv(64)
+        except ConnectionRefusedError as error:
             raise DaemonUnreachable(
                 f"no daemon for arm {arm_name!r} runs on this machine"
             ) from error
-        try:
-            connection.sendall(b"estop\n")
-            answer = connection.recv(64)
-        except OSError:
+        except OSError:  # it is there, and stuck
             answer = b""
     if answer != b"stopped\n":
         raise NotConfirmed(

@@ -132,10 +132,12 @@ class Loop:
         """Latch a fault and vent at once; where even that fails, the next tick tries again."""
         now_s = self._now_ns * 1e-9
         self._sent = np.zeros_like(self._sent)
+        self._tick["pressure_sent_pa"] = self._tick["pressure_commanded_pa"] = self._sent
         try:
             self._hardware.vent(now_s)
         except Exception as error:
             cause += f"; the device could not be vented: {error}"
+            self._tick["pressure_sent_pa"] = np.nan
         self._keeper.apply(ModeEvent.FAULT, now_s, cause=cause)
 
     def tick(
@@ -161,6 +163,7 @@ class Loop:
         self, commands: list[Command], replies: list[ModeReply], dt_s: float, disk: Disk
     ) -> None:
         now_s = self._now_ns * 1e-9
+        self._tick["pressure_measured_pa"] = np.nan  # a record of a failed reading shows no old one
         try:
             measurement = self._hardware.read(now_s)
             self._tick["pressure_measured_pa"] = measurement.pressures_pa

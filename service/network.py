@@ -1,6 +1,8 @@
 """Opening Zenoh sessions: loopback unless told otherwise, no scouting, a clear word on failure."""
 
+import ipaddress
 import json
+import re
 import socket
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,13 +12,18 @@ import zenoh
 from controllers.errors import ConfigurationError, DaemonUnreachable
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-_LOOPBACK = ("127.", "localhost", "[::1]")
 
 
 def is_loopback(endpoint: str) -> bool:
     """Whether an endpoint such as ``tcp/127.0.0.1:7447`` is reached from this machine only."""
-    address = endpoint.partition("/")[2]
-    return address.startswith(_LOOPBACK) or endpoint.startswith("unixsock")
+    if endpoint.startswith(("unixsock", "unixpipe")):
+        return True
+    address = re.split("[?#]", endpoint.partition("/")[2])[0]
+    host = address.rpartition(":")[0].strip("[]")
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name
+        return host == "localhost"
 
 
 def read_config(config_file: str) -> zenoh.Config:

@@ -10,6 +10,9 @@ from logs.status import RecorderStatus, ViewerStatus
 from service.config import Configuration
 from service.usage import ProcessTable
 
+#: Ctrl-C, the order to end, and a terminal that was closed.
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
 
 @dataclass(frozen=True)
 class Shared:
@@ -40,9 +43,9 @@ class Shared:
 
 
 def ignore_terminal_signals() -> None:
-    """Leave Ctrl-C and SIGTERM to the supervisor, which ends the processes in their order."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    """Leave the signals that end us to the supervisor, which ends the processes in their order."""
+    for number in ENDING_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def parent_is_alive() -> bool:

@@ -3,6 +3,7 @@
 import time
 from multiprocessing.connection import Connection
 
+from controllers.errors import LogError
 from logs.recorder import Recorder, RecorderSettings
 from service import realtime
 from service.config import log_directory
@@ -54,9 +55,12 @@ def _finish(recorder: Recorder) -> None:
     while True:
         try:
             recorder.finish()
-        except OSError:
+        except OSError as error:
             if time.monotonic() > give_up_s:
-                raise
+                raise LogError(
+                    f"the log could not be closed ({error.strerror}) and lacks its end; free some "
+                    "space, and the next start repairs it"
+                ) from error
             time.sleep(0.5)
         else:
             return

@@ -1,5 +1,6 @@
 """Mends what a crash has left of earlier sessions, beside the running daemon."""
 
+import signal
 from multiprocessing.context import SpawnContext
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from logs.session import repair, unfinished
 def _mend(paths: list[Path]) -> None:
     from service import realtime
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor ends this process
     realtime.step_back(19)
     for path in paths:
         try:

@@ -26,7 +26,7 @@ from service.facts import info_of
 from service.local_stop import lock
 from service.mode import ModeEvent
 from service.network import check_free, read_config
-from service.process import Shared
+from service.process import ENDING_SIGNALS, Shared
 from service.repairing import start_mending
 from service.usage import ProcessTable
 
@@ -115,9 +115,10 @@ class Supervisor:
     # --- running ---------------------------------------------------------------------------
 
     def run(self) -> int:
-        """Run until SIGINT or SIGTERM, or until control is lost; return the exit status."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._on_signal)
+        """Run until SIGINT, SIGTERM or SIGHUP, or until control is lost; return the exit status."""
+        for number in ENDING_SIGNALS:
+            if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` sets it
+                signal.signal(number, self._on_signal)
         try:
             self._start_control()
             for line in start_facts(self._shared, self._realtime_fact()):

@@ -116,7 +116,8 @@ def main(shared: Shared, end: Connection) -> None:
         if configuration.rerun.open_viewer and has_display():
             open_viewer(rerun_url(configuration))
         viewing = Viewing(shared, view)
-        while not end.poll(_PERIOD_S) and parent_is_alive():
+        # Without its server the viewer ends too, and is started again with a new one.
+        while not end.poll(_PERIOD_S) and parent_is_alive() and server.poll() is None:
             viewing.step()
         recording.flush(timeout_sec=1.0)
         recording.disconnect()

@@ -4,6 +4,7 @@ Every daemon has its own arm's name, device, ports and log directory, so that th
 other daemons, and beside each other.
 """
 
+import contextlib
 import itertools
 import math
 import os
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 
 import tomli_w
 
-from controllers.errors import DaemonUnreachable
+from controllers.errors import DaemonUnreachable, PneuarmError
 from logs.reader import LogReader
 from logs.schema import pneuarm_pb2 as pb
 from logs.topics import HEALTH
@@ -94,6 +95,16 @@ class Daemon:
 
     def start(self) -> "Daemon":
         """Start it and wait until it answers and the arm is ready."""
+        self.launch()
+        try:
+            wait_for(self._answers, f"an answer of the daemon; it said: {self.output()}")
+        except BaseException:
+            self.kill()
+            raise
+        return self
+
+    def launch(self) -> None:
+        """Start the process."""
         with self._output.open("ab") as output:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "pneuarm", "run", str(self.config)],
@@ -102,12 +113,6 @@ class Daemon:
                 stderr=subprocess.STDOUT,
                 process_group=0,
             )
-        try:
-            wait_for(self._answers, f"an answer of the daemon; it said: {self.output()}")
-        except BaseException:
-            self.kill()
-            raise
-        return self
 
     def _answers(self) -> bool:
         assert self.process is not None
@@ -210,6 +215,20 @@ class Daemon:
                 self.stop()
         finally:
             self.kill()
+
+
+def arm(client: Client) -> None:
+    """Take the lease and arm; an arm that is still active from before stays so."""
+
+    def armed() -> bool:
+        with contextlib.suppress(PneuarmError):
+            if client.state().mode == pb.ACTIVE:
+                client.take_lease()
+            else:
+                client.enable()
+        return client.state().mode == pb.ACTIVE
+
+    wait_for(armed, "the arm to be active")
 
 
 def keep_moving(client: Client, until: Callable[[], T], what: str) -> T:

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from controllers.errors import PneuarmError
 from logs.reader import summarise
 from logs.schema import pneuarm_pb2 as pb
-from service.client import Client
-from tests.service.daemon import Daemon, enough, keep_moving, wait_for
+from tests.service.daemon import Daemon, arm, enough, keep_moving, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -21,15 +19,6 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     tables = {"control": {"target_timeout_ms": 5000}}
     with Daemon(tmp_path_factory.mktemp("gateway"), tables) as daemon:
         yield daemon
-
-
-def enable(client: Client) -> bool:
-    """Arm as soon as the daemon takes it, whatever it said before."""
-    try:
-        client.enable()
-    except PneuarmError:
-        return False
-    return True
 
 
 def ready_again(daemon: Daemon) -> None:
@@ -46,7 +35,7 @@ def test_gateway_killed_arm_holds_and_the_client_goes_on(daemon: Daemon) -> None
         before = client.state().sequence
         os.kill(gateway, signal.SIGKILL)
         wait_for(lambda: "gateway_restarted" in daemon.codes(), "the gateway started again")
-        wait_for(lambda: enable(client), "the same client to arm again")
+        arm(client)
         state = client.move_to((0.0, 0.0, 0.21))
         assert state.reach == pb.REACHED
         assert state.sequence > before
@@ -61,7 +50,7 @@ def test_gateway_killed_arm_holds_and_the_client_goes_on(daemon: Daemon) -> None
 def test_gateway_stopped_arm_holds_then_vents(daemon: Daemon) -> None:
     gateway = daemon.pids("gateway")["gateway"]
     with daemon.client() as client:
-        wait_for(lambda: enable(client), "the arm to be enabled")
+        arm(client)
         keep_moving(client, enough(0.5), "some movement")
         known = len(daemon.codes())
         os.kill(gateway, signal.SIGSTOP)
@@ -69,7 +58,7 @@ def test_gateway_stopped_arm_holds_then_vents(daemon: Daemon) -> None:
             wait_for(lambda: "gateway_lost" in daemon.codes()[known:], "the arm to vent")
         finally:
             os.kill(gateway, signal.SIGCONT)
-        wait_for(lambda: enable(client), "the same client to arm again")
+        arm(client)
     new = daemon.codes()[known:]
     assert new[:2] == ["gateway_silent", "gateway_lost"]
     assert [event.mode for event in daemon.events()[known:]][:2] == [pb.HOLD, pb.IDLE]
@@ -78,7 +67,7 @@ def test_gateway_stopped_arm_holds_then_vents(daemon: Daemon) -> None:
 def test_local_stop_works_while_the_gateway_stands_still(daemon: Daemon) -> None:
     gateway = daemon.pids("gateway")["gateway"]
     with daemon.client() as client:
-        wait_for(lambda: enable(client), "the arm to be enabled")
+        arm(client)
         os.kill(gateway, signal.SIGSTOP)
         try:
             done = daemon.command("estop", "--json")
@@ -92,7 +81,7 @@ def test_local_stop_works_while_the_gateway_stands_still(daemon: Daemon) -> None
 
 def test_stop_goes_through_the_network_while_the_supervisor_stands_still(daemon: Daemon) -> None:
     with daemon.client() as client:
-        wait_for(lambda: enable(client), "the arm to be enabled")
+        arm(client)
         daemon.send_signal(signal.SIGSTOP)
         try:
             done = daemon.command("estop", "--json")

@@ -205,6 +205,8 @@ def test_a_failed_tick_writes_down_what_was_sent() -> None:
     bench.run(0.1)
     assert bench.mode == Mode.FAULT
     assert not bench.newest["pressure_sent_pa"].any()
+    assert np.isnan(bench.newest["pressure_measured_pa"]).all()
+    assert not bench.loop.pressure_near_zero  # not known
 
 
 def test_events_and_ticks_have_the_time_of_the_session() -> None:
