@@ -110,13 +110,15 @@ def _add_client(commands: Subparsers) -> None:
     )
     kinds = send.add_subparsers(dest="kind", required=True, metavar="KIND")
     position = kinds.add_parser("position", help="tip position in the base frame, mm")
-    position.add_argument("values", nargs=3, type=float, metavar=("X", "Y", "Z"))
     pose = kinds.add_parser("pose", help="tip position, mm, and quaternion x y z w")
-    pose.add_argument(
-        "values", nargs=7, type=float, metavar=("X", "Y", "Z", "QX", "QY", "QZ", "QW")
-    )
     twist = kinds.add_parser("twist", help="tip velocity, mm/s, for some seconds")
-    twist.add_argument("values", nargs=3, type=float, metavar=("VX", "VY", "VZ"))
+    # One name for all values: where some are missing, argparse cannot tell a tuple of names.
+    for parser, count, names in (
+        (position, 3, "X Y Z, mm"),
+        (pose, 7, "X Y Z, mm, QX QY QZ QW"),
+        (twist, 3, "VX VY VZ, mm/s"),
+    ):
+        parser.add_argument("values", nargs=count, type=float, metavar="VALUE", help=names)
     twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")
     twist.add_argument("--frame", choices=("base", "tip"), default="base")
     twist.add_argument("--point", choices=("tip", "base"), default="tip", help="reference point")

@@ -306,7 +306,9 @@ class Client:
         raise NotConfirmed(f"not reached within {timeout_s:g} s")
 
     def raise_if_refused(self) -> None:
-        """Raise TargetRejected if the daemon has refused something of this client's."""
+        """Raise TargetRejected if the daemon has refused a target of this client's."""
         for event in self.events():
-            if event.code == "rejected" and event.client_id == self.client_id:
+            ours = event.code == "rejected" and event.client_id == self.client_id
+            # A refused request was raised by its own call; its event may come after that.
+            if ours and event.text.startswith(TARGET.key):
                 raise TargetRejected(event.text)

@@ -13,40 +13,32 @@ from multiprocessing.connection import Connection
 from typing import cast
 
 import zenoh
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
-from google.protobuf.message import Message
 
 from controllers.errors import LeaseRefused, TargetRejected
 from logs.codec import decode, encode, encoding_of, is_json
-from logs.rings import MessageWriter
 from logs.schema import pneuarm_pb2 as pb
 from logs.topics import (
     ALIVE_CLIENT,
     ALIVE_DAEMON,
     ESTOP,
-    EVENT,
     HEALTH,
     INFO,
     MODE,
     TARGET,
     TIP_POSE,
-    Topic,
     full_key,
 )
 from service import network
-from service.checks import TargetChecker
-from service.commands import Heartbeat, ModeReply, Pipe, RequestMode, SetTarget, SetTipPose
+from service.commands import Heartbeat, ModeReply, Pipe, RequestMode
+from service.inbox import Inbox
 from service.lease import Lease
 from service.mode import ModeEvent
+from service.notes import Notes
 from service.process import Shared, ignore_terminal_signals, parent_is_alive
 from service.publisher import Publisher
 
 _PERIOD_S = 0.01
 _HEARTBEAT_S = 0.05
-_SHOWN_PAYLOAD_BYTES = 200
-
-#: A client may have seen states that this process has not read from the ring yet.
-_AHEAD_TICKS = 1000
 
 _EVENTS = {
     pb.ENABLE: ModeEvent.ENABLE,
@@ -67,16 +59,14 @@ class Gateway:
         # A stop never queues behind targets or poses: those have a pipe of their own.
         self._requests, self._stream = requests, stream
         self._arm = shared.configuration.build_arm()
-        self._checker = TargetChecker(self._arm)
         self._lease = Lease(control.lease_timeout_s)
-        self._messages = MessageWriter(shared.rings.gateway)
         self._publisher = Publisher(shared, self._arm, session)
-        self._lock = threading.RLock()
+        self._lock = threading.RLock()  # Zenoh calls back from threads of its own
+        self._notes = Notes(shared, self._publisher, self._lease, self._lock)
+        self._inbox = Inbox(shared, stream, self._lease, self._publisher, self._notes)
         self._pending: dict[int, tuple[zenoh.Query, str, str]] = {}
         self._request_id = 2 * secrets.randbelow(2**40)  # no reply to a dead gateway matches
         self._stop_asked = False
-        self._rejected = 0
-        self._stale_s = control.target_timeout_ms * 1e-3
         self._declared = self._declare()
 
     def _declare(self) -> list[object]:
@@ -84,70 +74,14 @@ class Gateway:
         session, name = self._session, self._arm.name
         alive = full_key(name, f"{ALIVE_CLIENT}/*")
         return [
-            session.declare_subscriber(full_key(name, TARGET.key), self._on_target),
+            session.declare_subscriber(full_key(name, TARGET.key), self._inbox.on_target),
             session.declare_subscriber(full_key(name, ESTOP.key), self._on_estop),
-            session.declare_subscriber(full_key(name, TIP_POSE.key), self._on_tip_pose),
+            session.declare_subscriber(full_key(name, TIP_POSE.key), self._inbox.on_tip_pose),
             session.declare_queryable(full_key(name, MODE.key), self._on_mode),
             session.declare_queryable(full_key(name, INFO.key), self._on_info),
             session.liveliness().declare_subscriber(alive, self._on_alive),
             session.liveliness().declare_token(full_key(name, ALIVE_DAEMON)),
         ]
-
-    # --- what comes in ---------------------------------------------------------------------
-
-    def _on_target(self, sample: zenoh.Sample) -> None:
-        received_ns = time.monotonic_ns()
-        payload = sample.payload.to_bytes()
-        message = pb.Target()
-        try:
-            message = decode(pb.Target, payload, str(sample.encoding))
-            target = self._checker.target(message)
-            with self._lock:
-                self._check_fresh(message.state_sequence)
-                self._lease.check_target(
-                    message.client_id, message.lease_secret, message.sequence, received_ns * 1e-9
-                )
-                self._check_active()
-            self._stream.send(SetTarget(target, message.sequence, received_ns))
-        except TargetRejected as error:
-            self._reject(TARGET.key, str(error), payload, message.client_id)
-            return
-        message.lease_secret = ""  # the log is no place for it
-        self._log(TARGET, message, received_ns)
-
-    def _check_fresh(self, state_sequence: int) -> None:
-        newest = self._publisher.newest_sequence
-        age_s = (newest - state_sequence) / self._shared.configuration.control.rate_hz
-        if state_sequence > newest + _AHEAD_TICKS:
-            raise TargetRejected(
-                f"state_sequence = {state_sequence}, but the arm is only at {newest}; repeat the "
-                "number of the newest `state` that was received"
-            )
-        if age_s > self._stale_s:
-            raise TargetRejected(
-                f"state_sequence = {state_sequence} while the arm is at {newest}: the sender has "
-                f"not seen a state for {age_s:.3g} s (allowed: {self._stale_s:g} s); its network "
-                "is stalled, or it does not read `state`"
-            )
-
-    def _check_active(self) -> None:
-        mode = self._publisher.newest_mode
-        if mode != pb.ACTIVE:
-            raise TargetRejected(
-                f"the arm is in mode {pb.Mode.Name(mode).lower()} and follows no target; enable it"
-            )
-
-    def _on_tip_pose(self, sample: zenoh.Sample) -> None:
-        received_ns = time.monotonic_ns()
-        payload = sample.payload.to_bytes()
-        try:
-            message = decode(PoseInFrame, payload, str(sample.encoding))
-            position, quaternion = self._checker.tip_pose(message)
-        except TargetRejected as error:
-            self._reject(TIP_POSE.key, str(error), payload, "")
-            return
-        self._stream.send(SetTipPose(position, quaternion, received_ns))
-        self._log(TIP_POSE, message, received_ns)
 
     def _on_estop(self, sample: zenoh.Sample) -> None:
         """Stop, whatever was sent and whoever sent it; asked again until a state shows it."""
@@ -162,8 +96,6 @@ class Gateway:
             if held:
                 self._request(ModeEvent.LEASE_LOST, client)
 
-    # --- queries ---------------------------------------------------------------------------
-
     def _on_info(self, query: zenoh.Query) -> None:
         encoding = str(query.encoding) if query.payload is not None else ""
         self._reply(query, self._shared.info, encoding)
@@ -176,7 +108,7 @@ class Gateway:
             request = decode(pb.ModeRequest, payload, encoding)
             self._handle(request, query, encoding)
         except (TargetRejected, LeaseRefused) as error:
-            self._reject(MODE.key, str(error), b"", request.client_id)
+            self._notes.reject(MODE.key, str(error), b"", request.client_id)
             reply = pb.Reply(accepted=False, reason=str(error), lease_holder=self._lease.holder)
             reply.mode = self._publisher.newest_mode
             self._reply(query, reply, encoding)
@@ -250,28 +182,6 @@ class Gateway:
         self._publisher.newest_mode = message.mode
         self._reply(query, message, encoding)
 
-    # --- what goes out ---------------------------------------------------------------------
-
-    def _log(self, topic: Topic, message: Message, monotonic_ns: int) -> None:
-        with self._lock:
-            self._messages.write(topic, message, self._shared.unix_ns(monotonic_ns))
-
-    def _reject(self, key: str, reason: str, payload: bytes, client: str) -> None:
-        """Tell why a message changed nothing."""
-        event = pb.Event(
-            time_unix_ns=self._shared.unix_ns(time.monotonic_ns()),
-            level=pb.WARNING,
-            source="gateway",
-            code="rejected",
-            text=f"{key}: {reason}"[:400],
-            client_id=client[:64],
-            mode=self._publisher.newest_mode,
-            payload=self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES],
-        )
-        with self._lock:
-            self._rejected += 1
-            self._messages.write(EVENT, event, event.time_unix_ns)
-
     def run(self, end: Connection) -> None:
         """Publish at the wire's rates until the supervisor is gone or says to end."""
         heartbeat_s = 0.0
@@ -286,11 +196,11 @@ class Gateway:
                 self._requests.send(Heartbeat(operator=self._lease.has_operator(now_s)))
             for health in self._publisher.step(
                 now_s,
-                self._rejected,
+                self._notes.rejected,
                 self._requests.dropped + self._stream.dropped,
                 self._lease.holder,
             ):
-                self._log(HEALTH, health, time.monotonic_ns())
+                self._notes.log(HEALTH, health, time.monotonic_ns())
 
     def _insist_on_stop(self) -> None:
         """Repeat a stop that no state shows yet, should its message have been lost."""

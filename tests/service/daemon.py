@@ -4,7 +4,6 @@ Every daemon has its own arm's name, device, ports and log directory, so that th
 other daemons, and beside each other.
 """
 
-import contextlib
 import itertools
 import math
 import os
@@ -221,12 +220,12 @@ def arm(client: Client) -> None:
     """Take the lease and arm; an arm that is still active from before stays so."""
 
     def armed() -> bool:
-        with contextlib.suppress(PneuarmError):
-            if client.state().mode == pb.ACTIVE:
-                client.take_lease()
-            else:
-                client.enable()
-        return client.state().mode == pb.ACTIVE
+        try:
+            active = client.state().mode == pb.ACTIVE
+            reply = client.take_lease() if active else client.enable()
+        except PneuarmError:
+            return False
+        return reply.mode == pb.ACTIVE
 
     wait_for(armed, "the arm to be active")
 

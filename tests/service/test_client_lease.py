@@ -46,7 +46,7 @@ def sender(daemon: Daemon, watcher: Client, tmp_path: Path) -> Iterator["subproc
         [sys.executable, "-c", SENDER, daemon.arm, daemon.endpoint], cwd=ROOT
     )
     try:
-        wait_for(lambda: watcher.state().target_sequence > 10, "targets of the sender")
+        wait_for(lambda: watcher.state().target_kind == pb.POSITION, "targets of the sender")
         watcher.events()
         yield process
     finally:

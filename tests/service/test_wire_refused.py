@@ -187,7 +187,7 @@ def test_wrong_tip_pose(follower: Follower, payload: bytes) -> None:
 
 WRONG_REQUESTS: dict[str, tuple[dict[str, Any], str]] = {
     "not allowed now": ({"client_id": "wire", "action": "RESET"}, "mode is active: reset"),
-    "no action": ({"client_id": "wire"}, "action is missing; one of TAKE_LEASE, ENABLE"),
+    "no action": ({"client_id": "wire"}, "missing or unknown; one of TAKE_LEASE, ENABLE"),
     "another's arm": ({"client_id": "other", "action": "ENABLE"}, "wire holds the arm"),
     "nobody's": ({"action": "TAKE_LEASE"}, "client_id must have 1 to 64 characters"),
     "another's release": ({"client_id": "other", "action": "RELEASE_LEASE"}, "does not hold"),

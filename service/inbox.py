@@ -1,0 +1,89 @@
+"""What clients stream in: targets and measured tip poses, checked before they go to control."""
+
+import time
+
+import zenoh
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+
+from controllers.errors import TargetRejected
+from logs.codec import decode
+from logs.schema import pneuarm_pb2 as pb
+from logs.topics import TARGET, TIP_POSE
+from service.checks import TargetChecker
+from service.commands import Pipe, SetTarget, SetTipPose
+from service.lease import Lease
+from service.notes import Notes
+from service.process import Shared
+from service.publisher import Publisher
+
+#: A client may have seen states that this process has not read from the ring yet.
+_AHEAD_TICKS = 1000
+
+
+class Inbox:
+    """Callbacks of the two streams; what they refuse becomes an event that says why."""
+
+    def __init__(
+        self, shared: Shared, stream: Pipe, lease: Lease, publisher: Publisher, notes: Notes
+    ) -> None:
+        control = shared.configuration.control
+        self._stream, self._lease, self._publisher, self._notes = stream, lease, publisher, notes
+        self._checker = TargetChecker(shared.configuration.build_arm())
+        self._rate_hz = control.rate_hz
+        self._stale_s = control.target_timeout_ms * 1e-3
+
+    def on_target(self, sample: zenoh.Sample) -> None:
+        """Take a target from who holds the lease."""
+        received_ns = time.monotonic_ns()
+        payload = sample.payload.to_bytes()
+        message = pb.Target()
+        try:
+            message = decode(pb.Target, payload, str(sample.encoding))
+            target = self._checker.target(message)
+            with self._notes.lock:
+                self._check_fresh(message.state_sequence)
+                self._lease.check_target(
+                    message.client_id, message.lease_secret, message.sequence, received_ns * 1e-9
+                )
+                self._check_active()
+            self._stream.send(SetTarget(target, message.sequence, received_ns))
+        except TargetRejected as error:
+            self._notes.reject(TARGET.key, str(error), payload, message.client_id)
+            return
+        message.lease_secret = ""  # the log is no place for it
+        self._notes.log(TARGET, message, received_ns)
+
+    def _check_fresh(self, state_sequence: int) -> None:
+        newest = self._publisher.newest_sequence
+        age_s = (newest - state_sequence) / self._rate_hz
+        if state_sequence > newest + _AHEAD_TICKS:
+            raise TargetRejected(
+                f"state_sequence = {state_sequence}, but the arm is only at {newest}; repeat the "
+                "number of the newest `state` that was received"
+            )
+        if age_s > self._stale_s:
+            raise TargetRejected(
+                f"state_sequence = {state_sequence} while the arm is at {newest}: the sender has "
+                f"not seen a state for {age_s:.3g} s (allowed: {self._stale_s:g} s); its network "
+                "is stalled, or it does not read `state`"
+            )
+
+    def _check_active(self) -> None:
+        mode = self._publisher.newest_mode
+        if mode != pb.ACTIVE:
+            raise TargetRejected(
+                f"the arm is in mode {pb.Mode.Name(mode).lower()} and follows no target; enable it"
+            )
+
+    def on_tip_pose(self, sample: zenoh.Sample) -> None:
+        """Take a tip pose that motion capture has measured."""
+        received_ns = time.monotonic_ns()
+        payload = sample.payload.to_bytes()
+        try:
+            message = decode(PoseInFrame, payload, str(sample.encoding))
+            position, quaternion = self._checker.tip_pose(message)
+        except TargetRejected as error:
+            self._notes.reject(TIP_POSE.key, str(error), payload, "")
+            return
+        self._stream.send(SetTipPose(position, quaternion, received_ns))
+        self._notes.log(TIP_POSE, message, received_ns)

@@ -1,0 +1,48 @@
+"""What the gateway writes down: accepted messages, and why others were refused."""
+
+import threading
+import time
+
+from google.protobuf.message import Message
+
+from logs.rings import MessageWriter
+from logs.schema import pneuarm_pb2 as pb
+from logs.topics import EVENT, Topic
+from service.lease import Lease
+from service.process import Shared
+from service.publisher import Publisher
+
+_SHOWN_PAYLOAD_BYTES = 200
+
+
+class Notes:
+    """Writes to the gateway's ring; ``lock`` is held for every write and every use of the lease."""
+
+    def __init__(
+        self, shared: Shared, publisher: Publisher, lease: Lease, lock: threading.RLock
+    ) -> None:
+        self.lock = lock
+        self.rejected = 0
+        self._shared, self._publisher, self._lease = shared, publisher, lease
+        self._messages = MessageWriter(shared.rings.gateway)
+
+    def log(self, topic: Topic, message: Message, monotonic_ns: int) -> None:
+        """Write down a message that was accepted, or one of our own."""
+        with self.lock:
+            self._messages.write(topic, message, self._shared.unix_ns(monotonic_ns))
+
+    def reject(self, key: str, reason: str, payload: bytes, client: str) -> None:
+        """Tell why a message changed nothing."""
+        event = pb.Event(
+            time_unix_ns=self._shared.unix_ns(time.monotonic_ns()),
+            level=pb.WARNING,
+            source="gateway",
+            code="rejected",
+            text=f"{key}: {reason}"[:400],
+            client_id=client[:64],
+            mode=self._publisher.newest_mode,
+            payload=self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES],
+        )
+        with self.lock:
+            self.rejected += 1
+            self._messages.write(EVENT, event, event.time_unix_ns)
