@@ -18,8 +18,8 @@ def paced(
         for entry in reader:
             first_ns = entry.time_unix_ns if first_ns is None else first_ns
             due_s = began_s + (entry.time_unix_ns - first_ns) * 1e-9 / speed
-            if due_s > clock_s():
-                sleep_s(due_s - clock_s())
+            if (wait_s := due_s - clock_s()) > 0:
+                sleep_s(wait_s)
             yield entry
         if not loop:
             return

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
@@ -72,12 +71,8 @@ def whole_records(path: Path) -> Iterable[object]:
                 yield next(records)
             except StopIteration:
                 return
-            except (McapError, EOFError, ValueError, OSError):
-                return  # broken off in the middle of a record
-            except Exception as error:  # the library lets decompression errors through as they are
-                if type(error).__module__.startswith(("zstandard", "struct", "lz4", "_struct")):
-                    return
-                raise
+            except Exception:  # broken off or damaged; there is nothing the library does not raise
+                return
 
 
 def repair(path: Path) -> tuple[Path, int]:
@@ -119,7 +114,7 @@ def _copy_records(source: Path, destination: Path) -> int:
                     channels[record.id] = writer.register_channel(
                         record.topic, record.message_encoding, schemas.get(record.schema_id, 0)
                     )
-                case Message():
+                case Message() if record.channel_id in channels:
                     writer.add_message(
                         channels[record.channel_id],
                         record.log_time,

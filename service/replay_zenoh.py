@@ -25,17 +25,21 @@ def replay_over_zenoh(reader: LogReader, speed: float, loop: bool, listen: str) 
             )
             for topic in _OUT
         }
-        session.liveliness().declare_token(full_key(arm, ALIVE_DAEMON))
+        token = session.liveliness().declare_token(full_key(arm, ALIVE_DAEMON))
         print(f"replaying {reader.parts[0]} at speed {speed:g} on {listen}", flush=True)
-        next_ns: dict[str, int] = {}
+        shown_ns: dict[str, int] = {}
         for entry in paced(reader, speed, loop, time.monotonic, time.sleep):
             topic = entry.topic
-            if topic not in _OUT or entry.time_unix_ns < next_ns.get(topic.key, 0):
+            if topic not in _OUT:
                 continue
             if topic.rate_hz is not None:  # the file has every tick, the wire has not
-                next_ns[topic.key] = entry.time_unix_ns + int(0.9e9 / topic.rate_hz)
+                since_ns = entry.time_unix_ns - shown_ns.get(topic.key, 0)
+                if 0 <= since_ns < 0.9e9 / topic.rate_hz:  # below 0 the log begins again
+                    continue
+                shown_ns[topic.key] = entry.time_unix_ns
             message = entry.message
             publishers[topic.key].put(message.SerializeToString(), encoding=encoding_of(message))
+        token.undeclare()
     finally:
         session.close()
     return 0

@@ -1,5 +1,6 @@
 """Session files: names, parts, what a crash leaves, and mending it."""
 
+import contextlib
 import os
 import struct
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.records import Metadata
 from mcap.writer import MCAP0_MAGIC, Writer
 
 from controllers.errors import LogError
@@ -21,8 +23,9 @@ from logs.session import (
     repair,
     session_name,
     unfinished,
+    whole_records,
 )
-from tests.logs.recording import make_session, recorded
+from tests.logs.recording import INFO, make_session, recorded
 
 CHUNKS = 8
 TICKS = 60  # a chunk
@@ -35,6 +38,9 @@ class Whole:
 
     content: bytes
     ends: list[int]
+
+    def __repr__(self) -> str:
+        return "Whole"
 
     def chunks_within(self, size: int) -> int:
         return sum(end <= size for end in self.ends)
@@ -87,6 +93,21 @@ def test_a_file_cut_anywhere_is_readable_up_to_its_last_whole_chunk(
         assert len(texts) == chunks
 
 
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
+def test_a_damaged_file_is_read_or_refused(
+    whole: Whole, tmp_path_factory: pytest.TempPathFactory, place: float, bit: int
+) -> None:
+    damaged = bytearray(whole.content)
+    damaged[int(place * len(damaged))] ^= 1 << bit
+    path = tmp_path_factory.mktemp("damaged") / "damaged.mcap"
+    path.write_bytes(damaged)
+    with contextlib.suppress(LogError):
+        for entry in LogReader(path):
+            assert entry.topic.message is not None
+    with contextlib.suppress(LogError):
+        assert is_finished(repair(path)[0]) or path.with_suffix(".mcap.broken").exists()
+
+
 @pytest.mark.parametrize("chunks", range(CHUNKS + 1))
 def test_a_broken_file_is_mended_with_everything_that_was_whole(
     whole: Whole, tmp_path: Path, chunks: int
@@ -103,6 +124,8 @@ def test_a_broken_file_is_mended_with_everything_that_was_whole(
         return
     assert mended == path
     assert messages == sum(1 for _ in LogReader(path))
+    metadata = [record for record in whole_records(path) if isinstance(record, Metadata)]
+    assert [record.metadata for record in metadata] == [{"config_toml": INFO.config_toml}]
     assert recorded(path)[0] == list(range(1, chunks * TICKS + 1))
     assert LogReader(path).finished
     assert unfinished(tmp_path) == []

@@ -1,138 +1,188 @@
-"""The command pipe: order, no waiting, losses counted, the end seen, alive after a spawn."""
+"""The commands by hand, as real processes against a real daemon."""
 
-import multiprocessing
-import select
-import time
+import json
+import math
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
 
-import numpy as np
 import pytest
 
-from controllers.targets import LengthsTarget, PositionTarget
-from service.commands import (
-    Heartbeat,
-    ModeReply,
-    Pipe,
-    RequestMode,
-    SetTarget,
-    SetTipPose,
-    Shutdown,
-    new_pipe,
+from logs.schema import pneuarm_pb2 as pb
+from service.client import Client
+from tests.service.daemon import ROOT, Daemon, assert_one_sentence, wait_for
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    with Daemon(tmp_path_factory.mktemp("commands")) as daemon:
+        yield daemon
+
+
+@pytest.fixture
+def watcher(daemon: Daemon) -> Iterator[Client]:
+    """A client that looks on, with the arm empty and ready before each test."""
+    with daemon.client("watcher") as client:
+        if client.state().mode == pb.ESTOP:
+            client.reset()
+        client.vent()
+        wait_for(lambda: client.state().mode == pb.READY, "an empty arm")
+        yield client
+
+
+TARGETS = {
+    "position": ("20", "-10", "210"),
+    "pose": ("0", "0", "210", "0", "0", "0", "1"),
+    "twist": ("10", "0", "-5.5", "--seconds", "0.3", "--frame", "tip"),
+    "lengths": ("205", "210", "200"),
+    "pressures": ("0.05", "-0.05", "0.1"),
+}
+
+
+@pytest.mark.parametrize("kind", TARGETS)
+def test_send_moves_and_leaves_the_arm_holding(daemon: Daemon, watcher: Client, kind: str) -> None:
+    done = daemon.command("send", kind, *TARGETS[kind], "--enable", "--json")
+    assert done.returncode == 0, done.stderr
+    state = json.loads(done.stdout)
+    assert state["target_kind"] == kind.upper()
+    assert state["mode"] == "ACTIVE"
+    if kind != "twist":
+        assert state["reach"] == "REACHED"
+    wait_for(lambda: watcher.state().mode == pb.HOLD, "the arm to hold")
+    if kind == "position":
+        there = watcher.state().tip_estimated_position_m
+        assert math.dist(there, (0.02, -0.01, 0.21)) < 5e-3
+    if kind == "pressures":
+        sent = list(watcher.state().pressure_sent_pa)
+        assert sent == pytest.approx([5e3, -5e3, 1e4], abs=1.0)
+
+
+def test_send_says_what_came_of_it(daemon: Daemon, watcher: Client) -> None:
+    done = daemon.command("send", "position", "0", "0", "210", "--enable", "--law", "resolved_rate")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("reached: tip at (")
+    assert done.stdout.endswith("; the arm holds\n")
+    away = daemon.command("send", "position", "0", "0", "350", "--enable")
+    assert away.returncode == 2
+    assert "out of reach: length, Eq. (4)" in away.stdout
+    assert "mm away" in away.stdout
+    assert away.stderr == ""
+
+
+def test_send_without_arming_is_refused(daemon: Daemon, watcher: Client) -> None:
+    done = daemon.command("send", "position", "20", "0", "210")
+    assert_one_sentence(done, "mode ready", "--enable")
+    assert watcher.state().mode == pb.READY
+
+
+def test_enable_then_send(daemon: Daemon, watcher: Client) -> None:
+    done = daemon.command("enable")
+    assert (done.returncode, done.stdout) == (0, "mode is active\n"), done.stderr
+    sent = daemon.command("send", "position", "10", "0", "210")
+    assert sent.returncode == 0, sent.stderr
+    assert sent.stdout.startswith("reached")
+
+
+@pytest.mark.parametrize(
+    ("command", "after"), [("enable", "ACTIVE"), ("hold", "HOLD"), ("vent", "IDLE")]
 )
-from service.mode import Mode, ModeEvent
+def test_modes_as_json(daemon: Daemon, watcher: Client, command: str, after: str) -> None:
+    if command != "enable":
+        watcher.enable()
+        watcher.release()
+    done = daemon.command(command, "--json")
+    assert done.returncode == 0, done.stderr
+    reply = json.loads(done.stdout)
+    assert reply["accepted"] is True
+    assert reply["mode"] == after
 
 
-def request(number: int) -> RequestMode:
-    return RequestMode(ModeEvent.HOLD, number, "me")
+def test_stop_and_reset(daemon: Daemon, watcher: Client) -> None:
+    watcher.enable()
+    watcher.release()
+    done = daemon.command("estop")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"STOPPED: arm {daemon.arm} vents, confirmed on this machine")
+    wait_for(lambda: watcher.state().mode == pb.ESTOP, "the stop")
+    assert_one_sentence(daemon.command("enable"), "emergency stop is latched", "reset")
+    reset = daemon.command("reset")
+    assert (reset.returncode, reset.stdout) == (0, "mode is idle\n")
+    assert_one_sentence(daemon.command("reset"), "reset")
 
 
-def test_messages_arrive_in_their_order_both_ways() -> None:
-    one, other = new_pipe()
-    for number in range(10):
-        assert one.send(request(number))
-        assert other.send(ModeReply(number, True, "", Mode.HOLD, 5))
-    assert [other.receive() for _ in range(10)] == [request(number) for number in range(10)]
-    assert one.receive() == ModeReply(0, True, "", Mode.HOLD, 5)
-    assert (one.dropped, one.closed) == (0, False)
+def test_state_for_people_and_for_programs(daemon: Daemon, watcher: Client) -> None:
+    done = daemon.command("state")
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 1
+    for word in ("#", "ready", "tip (", " mm", " bar"):
+        assert word in done.stdout
+    state = json.loads(daemon.command("state", "--json").stdout)
+    assert state["mode"] == "READY"
+    assert len(state["pressure_measured_pa"]) == 3
 
 
-def test_every_message_comes_out_as_it_went_in() -> None:
-    one, other = new_pipe()
-    target = SetTarget(PositionTarget(np.array([0.1, np.pi, -1e-300])), 2**63, 2**62)
-    pose = SetTipPose(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 0.0, 1.0]), 7)
-    for message in (target, pose, Heartbeat(True), Shutdown()):
-        one.send(message)
-    found = other.receive()
-    assert isinstance(found, SetTarget)
-    assert isinstance(found.target, PositionTarget)
-    assert found.target.position_m.tobytes() == target.target.position_m.tobytes()
-    assert (found.sequence, found.received_ns) == (2**63, 2**62)
-    found_pose = other.receive()
-    assert isinstance(found_pose, SetTipPose)
-    assert found_pose.quaternion_xyzw.tolist() == [0.0, 0.0, 0.0, 1.0]
-    assert (other.receive(), other.receive()) == (Heartbeat(True), Shutdown())
+@pytest.mark.parametrize("json_wanted", [True, False])
+def test_state_follow_goes_on_until_ctrl_c(
+    daemon: Daemon, watcher: Client, json_wanted: bool
+) -> None:
+    options = ["--json"] if json_wanted else []
+    process = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "pneuarm", "state", "--follow", *options),
+            *("--arm", daemon.arm, "--connect", daemon.endpoint),
+        ],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        lines = [process.stdout.readline() for _ in range(5)]
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert errors == ""
+    if json_wanted:
+        numbers = [int(json.loads(line)["sequence"]) for line in lines]
+    else:
+        numbers = [int(line.split()[0].removeprefix("#")) for line in lines]
+    assert numbers == sorted(set(numbers))
 
 
-@pytest.mark.timeout(10)
-def test_an_empty_pipe_does_not_make_anybody_wait() -> None:
-    one, other = new_pipe()
-    assert other.receive() is None
-    assert not other.closed
-    one.send(Shutdown())
-    assert other.receive() == Shutdown()
-    assert other.receive() is None
+REFUSED = {
+    "millimetres": (("position", "20000", "0", "210"), "is it in mm?"),
+    "not a number": (("position", "nan", "0", "210"), "must be finite"),
+    "too few chambers": (("lengths", "200", "200"), "2 values; arm"),
+    "too long": (("lengths", "200", "200", "400"), "chamber 3 is 0.4 m"),
+    "too much": (("pressures", "0", "0", "9"), "allowed: -90000 to 90000 Pa"),
+    "no unit quaternion": (("pose", "0", "0", "200", "0", "0", "0", "2"), "unit quaternion"),
+    "fast": (("twist", "90000", "0", "0"), "is it in mm/s?"),
+}
 
 
-@pytest.mark.timeout(10)
-def test_a_full_pipe_does_not_make_anybody_wait_and_what_is_dropped_is_counted() -> None:
-    one, other = new_pipe()
-    results = [one.send(request(number)) for number in range(5000)]
-    sent = results.count(True)
-    assert 0 < sent < 5000
-    assert results == [True] * sent + [False] * (5000 - sent)
-    assert one.dropped == 5000 - sent
-    received = [other.receive() for _ in range(sent)]
-    assert received == [request(number) for number in range(sent)]
-    assert other.receive() is None
-    assert one.send(request(9999))
-    assert other.receive() == request(9999)
+@pytest.mark.parametrize("name", REFUSED)
+def test_send_tells_why_a_target_is_refused(daemon: Daemon, watcher: Client, name: str) -> None:
+    arguments, words = REFUSED[name]
+    assert_one_sentence(daemon.command("send", *arguments, "--enable"), words)
 
 
-def test_a_message_that_would_arrive_cut_off_is_dropped() -> None:
-    one, other = new_pipe()
-    assert not one.send(SetTarget(LengthsTarget(np.zeros((10_000, 3))), 1, 1))
-    assert one.dropped == 1
-    assert other.receive() is None
-    assert not other.closed
+def test_command_refused_while_another_holds_the_arm(daemon: Daemon, watcher: Client) -> None:
+    watcher.take_lease()
+    try:
+        assert_one_sentence(daemon.command("enable"), watcher.client_id, "--take-over")
+    finally:
+        watcher.release()
 
 
-def test_the_end_of_the_other_side_is_seen_after_its_last_message() -> None:
-    one, other = new_pipe()
-    one.send(Shutdown())
-    one.close()
-    assert other.receive() == Shutdown()
-    assert not other.closed
-    assert other.receive() is None
-    assert other.closed
-    assert not other.send(Shutdown())
-    assert other.dropped == 1
-
-
-def test_it_can_be_waited_for() -> None:
-    one, other = new_pipe()
-    assert select.select([other], [], [], 0)[0] == []
-    one.send(Shutdown())
-    assert select.select([other], [], [], 0)[0] == [other]
-
-
-def answer_in_child(pipe: Pipe) -> None:
-    """Answer requests until told to end; looks without waiting, as control does."""
-    empty = 0
-    while True:
-        message = pipe.receive()
-        if message is None:
-            empty += 1
-            time.sleep(0.001)
-        elif isinstance(message, RequestMode):
-            pipe.send(ModeReply(message.request_id, empty > 0, "", Mode.IDLE, 1))
-        elif isinstance(message, Shutdown):
-            return
-
-
-@pytest.mark.timeout(50)
-def test_it_survives_a_spawn_and_does_not_block_there_either() -> None:
-    one, other = new_pipe()
-    child = multiprocessing.get_context("spawn").Process(target=answer_in_child, args=(other,))
-    child.start()
-    other.close()
-    time.sleep(0.05)
-    for number in range(20):
-        one.send(request(number))
-        assert select.select([one], [], [], 30)[0]
-        reply = one.receive()
-        assert isinstance(reply, ModeReply)
-        assert reply.request_id == number
-    one.send(Shutdown())
-    child.join(30)
-    assert child.exitcode == 0
-    assert one.receive() is None
-    assert one.closed
+@pytest.mark.parametrize(
+    "command", [("state",), ("send", "position", "0", "0", "200"), ("hold",), ("estop",)]
+)
+def test_nobody_there_is_one_sentence(command: tuple[str, ...]) -> None:
+    nobody = Daemon.__new__(Daemon)
+    nobody.arm, nobody.endpoint = "nobody", "tcp/127.0.0.1:1"
+    done = nobody.command(*command)
+    assert_one_sentence(done, "tcp/127.0.0.1:1", "nobody")
