@@ -83,15 +83,28 @@ def test_a_process_that_is_gone_is_left_out() -> None:
     assert [row.name for row in usage.read(1.0, {})] == ["control"]
 
 
+STRANGELY_NAMED = """
+import ctypes, os
+ctypes.CDLL(None).prctl(15, b"a) b (c", 0, 0, 0)
+for line in os.fdopen(0):
+    end = sum(os.times()[:2]) + 0.2
+    while sum(os.times()[:2]) < end:
+        pass
+    print(flush=True)
+"""
+
+
 def test_a_name_with_spaces_and_brackets_does_not_confuse_it() -> None:
-    code = (
-        "import ctypes; ctypes.CDLL(None).prctl(15, b'a) b (c', 0, 0, 0);print(flush=True); input()"
-    )
     child = subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-c", STRANGELY_NAMED], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
+    assert child.stdin is not None
     assert child.stdout is not None
-    child.stdout.readline()
-    (row,) = ProcessUsage(table(control=child.pid)).read(0.0, {})
-    assert row.memory_bytes > 1_000_000
+    usage = ProcessUsage(table(control=child.pid))
+    for now_s in (0.0, 1.0):
+        child.stdin.write(b"work\n")
+        child.stdin.flush()
+        child.stdout.readline()
+        (row,) = usage.read(now_s, {})
+    assert row.cpu_share > 0.15
     child.communicate()
