@@ -34,6 +34,11 @@ class PatientFile:
         """Size of the file once everything is written."""
         return self._size
 
+    @property
+    def pending_bytes(self) -> int:
+        """What the disk has not taken yet."""
+        return len(self._pending)
+
     def flush(self) -> None:
         """Do nothing: :meth:`drain` decides when, and reports failure."""
 
@@ -91,6 +96,11 @@ class Part:
     def size_bytes(self) -> int:
         """Size of the file, without the chunk in progress."""
         return self._file.tell()
+
+    @property
+    def pending_bytes(self) -> int:
+        """What waits in memory for the disk."""
+        return self._file.pending_bytes
 
     def flush(self) -> None:
         """Close the chunk in progress and put everything on the disk; raises OSError."""

@@ -26,6 +26,9 @@ from logs.topics import BODY, INFO, STATE, TF, TIP, Topic
 _TICKS_AT_ONCE = 500
 _FLUSH_S = 0.4
 
+#: A disk that takes nothing must not fill the memory instead: ten minutes or so of ticks.
+_MOST_PENDING_BYTES = 256 * 1024 * 1024
+
 
 @dataclass(frozen=True)
 class RecorderSettings:
@@ -88,6 +91,9 @@ class Recorder:
 
     def step(self) -> int:
         """Move what is new into the file, flush and roll when due; return the number of records."""
+        if self._part.pending_bytes > _MOST_PENDING_BYTES:
+            self._flush(time.monotonic())  # a full disk: what is new waits in the rings
+            return 0
         records = self._ticks.read(_TICKS_AT_ONCE)
         for sequence, record in records:
             self._write_tick(sequence, np.frombuffer(record, self._dtype)[0])

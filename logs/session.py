@@ -17,6 +17,9 @@ from mcap.writer import MCAP0_MAGIC, Writer
 
 from controllers.errors import LogError
 
+#: What session_name() makes; other people's files in the directory are left alone.
+_OURS = "[0-9]*T[0-9]*Z-*.mcap"
+
 
 def session_name(start_unix_ns: int, arm_name: str) -> str:
     """Name of a session: UTC time of its start, and the arm."""
@@ -48,7 +51,7 @@ def unfinished(directory: Path) -> list[Path]:
     """Return parts that a crash has left: not finished, and no recorder holds them."""
     return [
         path
-        for path in sorted(directory.glob("*.mcap"))
+        for path in sorted(directory.glob(_OURS))
         if not is_finished(path) and not _is_locked(path)
     ]
 
@@ -141,7 +144,7 @@ def delete_oldest(directory: Path, keep_bytes: int) -> list[Path]:
     """Delete the oldest finished parts until the rest fits ``keep_bytes``; 0 keeps everything."""
     if keep_bytes <= 0:
         return []
-    files = sorted(directory.glob("*.mcap"), key=_age, reverse=True)
+    files = sorted(directory.glob(_OURS), key=_age, reverse=True)
     total, deleted = 0, []
     for path in files:
         total += path.stat().st_size

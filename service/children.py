@@ -1,9 +1,11 @@
 """A child process of the daemon: started with spawn, ended by a word, revived if it may be."""
 
 import importlib
+import signal
 import sys
 import time
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 
@@ -52,10 +54,20 @@ class Child:
         theirs, self._end = self._context.Pipe(duplex=False)
         arguments = (self.name, (*self._arguments, theirs))
         self._process = self._context.Process(target=enter, args=arguments, name=self.name)
-        self._process.start()
+        self._start_unheard(self._process)
         theirs.close()
         self._started_s = time.monotonic()
         self._table.started(self.name, self._process.pid or 0, self._restarts)
+
+    @staticmethod
+    def _start_unheard(process: SpawnProcess) -> None:
+        """Start with the terminal's signals blocked: who still imports cannot ignore them yet."""
+        resource_tracker.ensure_running()  # its own start would unblock them
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+        try:
+            process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def is_alive(self) -> bool:
         """Whether it runs (or is stopped, which only its silence tells)."""

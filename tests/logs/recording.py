@@ -48,7 +48,7 @@ class Session:
         self.status = RecorderStatus.create(CONTEXT)
         self.settings = RecorderSettings(
             directory=directory,
-            session="s-paper",
+            session="20260102T000000Z-paper",
             arm=paper_arm(),
             roll_bytes=1 << 30,
             roll_s=1e9,
@@ -62,7 +62,7 @@ class Session:
 
     @property
     def path(self) -> Path:
-        return self.settings.directory / "s-paper.mcap"
+        return self.settings.directory / "20260102T000000Z-paper.mcap"
 
     def configure(self, **changes: object) -> None:
         self.settings = replace(self.settings, **changes)  # type: ignore[arg-type]

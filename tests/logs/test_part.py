@@ -92,7 +92,7 @@ def test_on_a_full_disk_nothing_is_lost_and_the_status_says_so(tmp_path: Path) -
     assert [disk for disk, _ in told] == [Disk.OK] * 2 + [Disk.FULL] * 3 + [Disk.OK]
     # While the disk is full a successor would have to begin where it was still good.
     assert [tick for _, tick in told] == [201, 401, 401, 401, 401, 1201]
-    ticks, texts = recorded(tmp_path / "sessions" / "s-paper.mcap")
+    ticks, texts = recorded(tmp_path / "sessions" / "20260102T000000Z-paper.mcap")
     assert ticks == list(range(1, 1201))
     assert set(texts) == {f"event {number}" for number in range(1, 31)}
     assert len(texts) == 30

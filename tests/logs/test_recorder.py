@@ -191,7 +191,7 @@ def test_low_free_space_is_said(session: Session, min_free_bytes: int, disk: Dis
 def test_old_sessions_are_deleted_to_keep_what_was_configured(session: Session) -> None:
     session.settings.directory.mkdir()
     session.recorder().finish()
-    old = session.path.rename(session.settings.directory / "a-paper.mcap")
+    old = session.path.rename(session.settings.directory / "20260101T000000Z-paper.mcap")
     session.configure(keep_bytes=old.stat().st_size // 2)
     session.recorder().finish()
     assert not old.exists()

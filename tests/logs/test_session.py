@@ -112,13 +112,13 @@ def test_a_damaged_file_is_read_or_refused(
 def test_a_broken_file_is_mended_with_everything_that_was_whole(
     whole: Whole, tmp_path: Path, chunks: int
 ) -> None:
-    path = tmp_path / "s-paper.mcap"
+    path = tmp_path / "20260102T000000Z-paper.mcap"
     end = whole.ends[chunks] if chunks < CHUNKS else len(whole.content)
     path.write_bytes(whole.content[: end - 1])
     assert unfinished(tmp_path) == [path]
     mended, messages = repair(path)
     if chunks == 0:
-        assert (mended.name, messages) == ("s-paper.mcap.broken", 0)
+        assert (mended.name, messages) == ("20260102T000000Z-paper.mcap.broken", 0)
         assert list(tmp_path.iterdir()) == [mended]
         assert mended.read_bytes() == whole.content[: end - 1]
         return
@@ -133,7 +133,7 @@ def test_a_broken_file_is_mended_with_everything_that_was_whole(
 
 
 def test_mending_a_mended_file_changes_nothing(whole: Whole, tmp_path: Path) -> None:
-    path = tmp_path / "s-paper.mcap"
+    path = tmp_path / "20260102T000000Z-paper.mcap"
     path.write_bytes(whole.content[: whole.ends[3]])
     repair(path)
     before = [(entry.topic, entry.message, entry.time_unix_ns) for entry in LogReader(path)]
@@ -143,11 +143,11 @@ def test_mending_a_mended_file_changes_nothing(whole: Whole, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"rubbish" * 100])
 def test_a_file_without_a_whole_record_is_set_aside(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "x.mcap"
+    path = tmp_path / "20260101T000000Z-x.mcap"
     path.write_bytes(content)
     assert unfinished(tmp_path) == [path]
     mended, messages = repair(path)
-    assert (mended.name, messages, mended.read_bytes()) == ("x.mcap.broken", 0, content)
+    assert (mended.name, messages, mended.read_bytes()) == (f"{path.name}.broken", 0, content)
     assert unfinished(tmp_path) == []
 
 
@@ -166,26 +166,28 @@ def test_mending_keeps_messages_of_others_without_schema_too(tmp_path: Path) -> 
 def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
     whole: Whole, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "s-paper.mcap"
+    path = tmp_path / "20260102T000000Z-paper.mcap"
     path.write_bytes(whole.content[: whole.ends[3]])
 
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("logs.session.os.fsync", full)
-    with pytest.raises(LogError, match=r"s-paper\.mcap cannot be repaired: .*free some space"):
+    with pytest.raises(
+        LogError, match=r"20260102T000000Z-paper\.mcap cannot be repaired: .*free some space"
+    ):
         repair(path)
     assert path.read_bytes() == whole.content[: whole.ends[3]]
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_file_that_a_recorder_holds_is_not_taken_for_broken(tmp_path: Path) -> None:
-    part = Part(tmp_path / "s-paper.mcap", "paper")
+    part = Part(tmp_path / "20260102T000000Z-paper.mcap", "paper")
     part.add_metadata("a", {})
     part.flush()
     assert unfinished(tmp_path) == []
     os.close(part._file._fd)  # as when its process dies
-    assert unfinished(tmp_path) == [tmp_path / "s-paper.mcap"]
+    assert unfinished(tmp_path) == [tmp_path / "20260102T000000Z-paper.mcap"]
 
 
 def test_names_and_parts(tmp_path: Path) -> None:
@@ -200,7 +202,9 @@ def test_names_and_parts(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kept", range(6))
 def test_the_oldest_parts_go_first(tmp_path: Path, kept: int) -> None:
-    names = ("a.mcap", "a.001.mcap", "a.002.mcap", "b.mcap", "b.001.mcap")  # oldest first
+    old, new = "20260101T000000Z-paper", "20260102T000000Z-paper"
+    parts = (".mcap", ".001.mcap", ".002.mcap")
+    names = [*(old + part for part in parts), *(new + part for part in parts[:2])]  # oldest first
     magic = b"\x89MCAP0\r\n"
     for name in names:
         (tmp_path / name).write_bytes(magic + bytes(84) + magic)
@@ -210,8 +214,16 @@ def test_the_oldest_parts_go_first(tmp_path: Path, kept: int) -> None:
 
 
 def test_nothing_is_deleted_that_is_unfinished_or_where_all_is_kept(tmp_path: Path) -> None:
-    (tmp_path / "a.mcap").write_bytes(bytes(100))
+    (tmp_path / "20260101T000000Z-paper.mcap").write_bytes(bytes(100))
     assert delete_oldest(tmp_path, 1) == []
-    (tmp_path / "b.mcap").write_bytes(b"\x89MCAP0\r\n" * 2)
+    (tmp_path / "20260102T000000Z-paper.mcap").write_bytes(b"\x89MCAP0\r\n" * 2)
     assert delete_oldest(tmp_path, 0) == []
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_files_of_other_programs_are_left_alone(tmp_path: Path) -> None:
+    magic = b"\x89MCAP0\r\n"
+    (tmp_path / "mine.mcap").write_bytes(magic + bytes(84) + magic)
+    (tmp_path / "broken.mcap").write_bytes(magic)
+    assert delete_oldest(tmp_path, 1) == []
+    assert unfinished(tmp_path) == []

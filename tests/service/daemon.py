@@ -83,6 +83,8 @@ class Daemon:
         self._output = folder / f"daemon-{number}.txt"
         own: dict[str, dict[str, Any]] = {
             "arm": {"name": self.arm},
+            # A test that is late on a busy machine is no hanging client.
+            "control": {"target_timeout_ms": 5000},
             "zenoh": {"listen": [self.endpoint]},
             "rerun": {"enabled": False, "port": self.rerun_port},
             "log": {"directory": str(self.logs), "min_free_mib": 1},

@@ -27,7 +27,8 @@ with Client(sys.argv[1], sys.argv[2], "sender") as client:
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    with Daemon(tmp_path_factory.mktemp("lease")) as daemon:
+    tables = {"control": {"target_timeout_ms": 500}}
+    with Daemon(tmp_path_factory.mktemp("lease"), tables) as daemon:
         yield daemon
 
 

@@ -1,6 +1,7 @@
 """One daemon from its start to its end: what it says, how it ends, what a crash leaves."""
 
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -95,6 +96,7 @@ def test_ctrl_c_during_the_start_ends_without_a_traceback(tmp_path: Path) -> Non
     try:
         daemon.launch()
         wait_for(lambda: "log  " in daemon.output(), "the facts of the start")
+        time.sleep(0.15)  # the other processes are just loading their libraries
         daemon.send_signal_to_all(signal.SIGINT)
         assert daemon.wait() == 0
         assert "Traceback" not in daemon.output()

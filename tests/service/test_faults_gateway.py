@@ -15,9 +15,7 @@ from tests.service.daemon import Daemon, arm, enough, keep_moving, wait_for
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    # Targets last long here, so that it is the gateway's silence that counts.
-    tables = {"control": {"target_timeout_ms": 5000}}
-    with Daemon(tmp_path_factory.mktemp("gateway"), tables) as daemon:
+    with Daemon(tmp_path_factory.mktemp("gateway")) as daemon:
         yield daemon
 
 

@@ -121,7 +121,9 @@ def answer_in_child(pipe: Pipe) -> None:
 @pytest.mark.timeout(50)
 def test_it_survives_a_spawn_and_does_not_block_there_either() -> None:
     one, other = new_pipe()
-    child = multiprocessing.get_context("spawn").Process(target=answer_in_child, args=(other,))
+    child = multiprocessing.get_context("spawn").Process(
+        target=answer_in_child, args=(other,), daemon=True
+    )
     child.start()
     other.close()
     assert select.select([one], [], [], 30)[0]

@@ -18,7 +18,8 @@ UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    with Daemon(tmp_path_factory.mktemp("refused")) as daemon:
+    tables = {"control": {"target_timeout_ms": 2000}}
+    with Daemon(tmp_path_factory.mktemp("refused"), tables) as daemon:
         yield daemon
 
 
@@ -32,6 +33,7 @@ class Follower(Wire):
     def settle(self) -> None:
         assert self.mode("ENABLE").accepted
         wait_for(lambda: self.refresh().reach == pb.REACHED, "the position")
+        wait_for(lambda: self.refresh().sequence > 3000, "ticks enough for an old state")
         self.events = self.listen("event")
 
     def rejection(self) -> pb.Event | None:
