@@ -134,7 +134,7 @@ class Controller:
             return self._tip
         step = self._law.step(self._task, self._tip, self.lengths_m, dt_s)
         self.fallbacks += step.fell_back
-        moved = float(np.abs(step.lengths_m - self.lengths_m).max())
+        moved = max(map(abs, (step.lengths_m - self.lengths_m).reshape(-1).tolist()))
         self.lengths_m = step.lengths_m
         self._tip = self._kinematics.evaluate(self.lengths_m)
         self._judge(self._tip, moved, dt_s)

@@ -50,7 +50,7 @@ def clamped_step(limits: Limits, lengths_m: Array, step_m: Array, dt_s: float) -
 
     Scaling keeps its direction, so the tip slows down instead of turning aside.
     """
-    allowed = limits.rate.rate_max_m_s.reshape(lengths_m.shape) * dt_s
+    allowed = limits.rate.rate_max_m_s.reshape(lengths_m.shape) * max(dt_s, 1e-9)
     step = step_m.reshape(lengths_m.shape)
     wanted = limits.clip(lengths_m + _share_allowed(allowed, step) * step)
     # Unbending may take a chamber further than the step did. The bounds of length and bend are
@@ -62,4 +62,5 @@ def clamped_step(limits: Limits, lengths_m: Array, step_m: Array, dt_s: float) -
 
 def _share_allowed(allowed: Array, step: Array) -> float:
     """Return the largest share, up to 1, of a step in which no chamber exceeds its allowance."""
-    return min(1.0, float((allowed / np.maximum(np.abs(step), 1e-15)).min()))
+    largest = max(map(abs, (step / allowed).reshape(-1).tolist()))
+    return 1.0 if largest <= 1.0 else 1.0 / largest

@@ -56,7 +56,7 @@ class IkProblem:
     def violation(self, x: Array) -> float:
         """Largest violation of a row at x."""
         rows = self.A @ x
-        return float(max((self.lower - rows).max(), (rows - self.upper).max()))
+        return float(np.maximum(self.lower - rows, rows - self.upper).max())
 
 
 def build_ik(
@@ -113,13 +113,14 @@ class IkSolver:
         A result counts only if OSQP calls it solved, it is finite and it respects the rows: an
         infeasible problem comes back as finite numbers near 2e9.
         """
-        # A sum is finite only if every element is.
-        if not math.isfinite(problem.q.sum() + problem.P.sum() + problem.A.sum()):
+        # A sum of squares is finite only if every element is.
+        flat = (problem.q, problem.P.reshape(-1), problem.A.reshape(-1))
+        if not math.isfinite(sum(float(values @ values) for values in flat)):
             return None  # a NaN would poison the warm start of every later solve
         self._update(problem)
         self._solver.solve()
         x = np.array(self._solver.solution.x)
-        accepted = self._solver.info.status_val == self._solved and np.isfinite(x).all()
+        accepted = self._solver.info.status_val == self._solved and math.isfinite(x @ x)
         if accepted and problem.violation(x) <= ACCEPTED_VIOLATION:
             return x * problem.step_m
         self._solver.warm_start(*self._zeros)

@@ -59,8 +59,18 @@ class Guard:
         too_old = not 0.0 <= now_s - commanded_at_s <= self._max_age_s
         if too_old or pressures_pa.shape != self._low.shape:
             return Guarded(np.zeros_like(self._low), Intervention.TOO_OLD)
+        largest = self._slew * self._elapsed_s(now_s)
+        low, high = self._sent - largest, self._sent + largest
+        allowed = np.minimum(np.maximum(pressures_pa, low), high)
+        # Range last, because a device may have acknowledged a little more than the range.
+        allowed = np.minimum(np.maximum(allowed, self._low), self._high)
+        if (allowed == pressures_pa).all():  # never true of a NaN
+            return Guarded(allowed, Intervention.NOTHING)
+        return self._changed(pressures_pa, low, high)
+
+    def _changed(self, wanted: Array, low: Array, high: Array) -> Guarded:
+        """Return what may be sent instead of a command that may not, and why; slew low to high."""
         intervention = Intervention.NOTHING
-        wanted = pressures_pa
         finite = np.isfinite(wanted)
         if not finite.all():
             wanted = np.where(finite, wanted, self._sent)
@@ -68,9 +78,7 @@ class Guard:
         in_range = np.minimum(np.maximum(wanted, self._low), self._high)
         if (in_range != wanted).any():
             intervention |= Intervention.RANGE
-        largest = self._slew * self._elapsed_s(now_s)
-        slewed = np.minimum(np.maximum(in_range, self._sent - largest), self._sent + largest)
-        # Last, because a device may have acknowledged a little more than the range.
+        slewed = np.minimum(np.maximum(in_range, low), high)
         slewed = np.minimum(np.maximum(slewed, self._low), self._high)
         if (slewed != in_range).any():
             intervention |= Intervention.SLEW

@@ -22,7 +22,7 @@ _RATE_HZ = 100.0
 _TURN_S = 4.0
 
 #: Shares of the whole time.
-_CIRCLE, _EIGHT = 0.4, 0.4
+_CIRCLE, _EIGHT = 0.45, 0.45
 
 Path = Callable[[float], tuple[float, float, float]]
 

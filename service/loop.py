@@ -101,8 +101,8 @@ class Loop:
     @property
     def pressure_near_zero(self) -> bool:
         """Whether every measured pressure of the last tick was near zero."""
-        measured = self._tick["pressure_measured_pa"]
-        return bool((np.abs(measured) < NEAR_ZERO_PA).all())
+        measured = self._tick["pressure_measured_pa"].reshape(-1).tolist()
+        return all(-NEAR_ZERO_PA < pressure < NEAR_ZERO_PA for pressure in measured)
 
     def warm_up(self) -> None:
         """Go once through everything before the first tick, so that no tick pays for first uses."""

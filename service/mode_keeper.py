@@ -23,7 +23,7 @@ class Timeouts:
     full_disk_vent_s: float
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)  # made in every tick: freezing it would cost more than all of its use
 class Watched:
     """What the keeper looks at once a tick. Ages in seconds; None means there is none."""
 

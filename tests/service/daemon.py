@@ -120,7 +120,9 @@ class Daemon:
         assert self.process.poll() is None, f"the daemon ended: {self.output()}"
         try:
             with self.client("start") as client:
-                return client.state().mode == pb.READY and client.info().log_path != ""
+                log = Path(client.info().log_path)
+                recording = log.exists() and log.stat().st_size > 0
+                return recording and client.state().mode == pb.READY
         except DaemonUnreachable:
             return False
 

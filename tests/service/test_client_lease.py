@@ -64,7 +64,7 @@ def held(watcher: Client) -> pb.Event:
         return bool(events)
 
     wait_for(found, "the event that the arm holds")
-    assert watcher.state().mode == pb.HOLD
+    wait_for(lambda: watcher.state().mode == pb.HOLD, "the state that the arm holds")
     return events[0]
 
 
