@@ -7,6 +7,7 @@ import ctypes
 import os
 import signal
 import subprocess
+import time
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -30,6 +31,9 @@ _PR_SET_PDEATHSIG = 1
 
 #: More than this behind (s) is not caught up but skipped.
 _CATCH_UP_S = 3.0
+
+#: After standing still for this long (s), the server may have dropped the connection.
+_STALLED_S = 5.0
 
 
 def start_server(configuration: Configuration) -> "subprocess.Popen[bytes]":
@@ -80,7 +84,7 @@ class Viewing:
     """Feeds the view from the rings."""
 
     def __init__(self, shared: Shared, view: View) -> None:
-        self._shared, self._view = shared, view
+        self._shared, self.view = shared, view
         self._dtype = tick_dtype(len(shared.configuration.arm.sections))
         self._ticks = RingReader(shared.rings.ticks)
         self._skipped = 0
@@ -92,10 +96,10 @@ class Viewing:
         self._skipped += self._ticks.skip_to(self._ticks.head() - self._most)
         records = [record for _, record in self._ticks.read(self._most)]
         if records:
-            self._view.ticks(np.frombuffer(b"".join(records), self._dtype))
+            self.view.ticks(np.frombuffer(b"".join(records), self._dtype))
         for topic, payload, _ in self._events.read():
             if topic is EVENT:
-                self._view.event(pb.Event.FromString(payload))
+                self.view.event(pb.Event.FromString(payload))
         self._shared.viewer.publish(self._skipped + self._ticks.missed)
 
 
@@ -107,20 +111,33 @@ def main(shared: Shared, end: Connection) -> None:
     server = start_server(configuration)
     shared.processes.started("rerun", server.pid)
     try:
-        recording = rr.RecordingStream(
-            f"pneuarm_{configuration.arm.name}", recording_id=shared.session
-        )
-        recording.connect_grpc(rerun_url(configuration))
-        view = View(configuration.build_arm(), recording)
-        view.start()
-        if configuration.rerun.open_viewer and has_display():
-            open_viewer(rerun_url(configuration))
-        viewing = Viewing(shared, view)
-        # Without its server the viewer ends too, and is started again with a new one.
-        while not end.poll(_PERIOD_S) and parent_is_alive() and server.poll() is None:
-            viewing.step()
-        recording.flush(timeout_sec=1.0)
-        recording.disconnect()
+        _run(shared, end, server)
     finally:
         server.terminate()
         os._exit(0)  # Rerun would wait for a server that is gone
+
+
+def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes]") -> None:
+    """Show until told to end. Without its server the viewer ends too, to be started anew."""
+    configuration = shared.configuration
+    recording, view = _connect(shared)
+    if configuration.rerun.open_viewer and has_display():
+        open_viewer(rerun_url(configuration))
+    viewing, stepped_s = Viewing(shared, view), time.monotonic()
+    while not end.poll(_PERIOD_S) and parent_is_alive() and server.poll() is None:
+        if time.monotonic() - stepped_s > _STALLED_S:
+            recording, viewing.view = _connect(shared)
+        stepped_s = time.monotonic()
+        viewing.step()
+    recording.flush(timeout_sec=1.0)
+    recording.disconnect()
+
+
+def _connect(shared: Shared) -> tuple[rr.RecordingStream, View]:
+    """Open the recording at the server, or go on with it over a new connection."""
+    configuration = shared.configuration
+    recording = rr.RecordingStream(f"pneuarm_{configuration.arm.name}", recording_id=shared.session)
+    recording.connect_grpc(rerun_url(configuration))
+    view = View(configuration.build_arm(), recording)
+    view.start()
+    return recording, view

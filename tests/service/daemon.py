@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import pytest
 import tomli_w
 
 from controllers.errors import DaemonUnreachable, PneuarmError
@@ -31,11 +32,15 @@ _numbers = itertools.count(1)
 T = TypeVar("T")
 
 
-def wait_for(condition: Callable[[], T], what: str, patience_s: float = PATIENCE_S) -> T:
+def wait_for(
+    condition: Callable[[], T], what: str | Callable[[], str], patience_s: float = PATIENCE_S
+) -> T:
     """Return the first true value of a condition; fails with what was waited for."""
     give_up_s = time.monotonic() + patience_s
     while not (value := condition()):
-        assert time.monotonic() < give_up_s, f"waited {patience_s:g} s in vain for: {what}"
+        if time.monotonic() > give_up_s:
+            told = what if isinstance(what, str) else what()
+            pytest.fail(f"waited {patience_s:g} s in vain for: {told}")
         time.sleep(0.01)
     return value
 
@@ -98,7 +103,7 @@ class Daemon:
         """Start it and wait until it answers and the arm is ready."""
         self.launch()
         try:
-            wait_for(self._answers, f"an answer of the daemon; it said: {self.output()}")
+            wait_for(self._answers, lambda: f"an answer of the daemon; it said: {self.output()}")
         except BaseException:
             self.kill()
             raise
@@ -147,7 +152,10 @@ class Daemon:
     def pids(self, *names: str) -> dict[str, int]:
         """Return process numbers by name, as `health` tells them, once all names are there."""
         with self.client("pids") as client:
-            return wait_for(lambda: _pids(client, names), f"processes {names} in health")
+            found = wait_for(lambda: _pids(client, names), f"processes {names} in health")
+        for name in names:  # these numbers get signals: they must be nobody else's
+            assert self._owns(found[name]), f"{name} {found[name]} is no process of this daemon"
+        return found
 
     def health(self) -> pb.Health:
         """Return the newest `health`."""
@@ -165,9 +173,23 @@ class Daemon:
     def wait(self) -> int:
         """Wait for the end of the supervisor and of all its children; return its status."""
         assert self.process is not None
-        status = self.process.wait(40)
-        wait_for(lambda: not self._running(), "the end of every child process")
-        return status
+        patience_s = 35.0  # the recorder alone may take 30 s to write what is left
+        wait_for(lambda: self.process and self.process.poll() is not None, self._what, patience_s)
+        wait_for(lambda: not self._running(), self._what)
+        return self.process.returncode
+
+    def _what(self) -> str:
+        """Say who is still there, for a test that waited in vain for the end."""
+        return f"the end of processes {self._running()}; the daemon said: {self.output()}"
+
+    def _owns(self, pid: int) -> bool:
+        """Say whether a process is of this daemon's group, or a child of one that is."""
+        running = self._running()
+        try:
+            parent = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            return False
+        return pid in running or parent in running
 
     def stop(self) -> None:
         """End it as it should end: SIGTERM, status 0, nothing left behind, no traceback."""
