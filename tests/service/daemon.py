@@ -151,11 +151,15 @@ class Daemon:
 
     def pids(self, *names: str) -> dict[str, int]:
         """Return process numbers by name, as `health` tells them, once all names are there."""
+
+        def found(client: Client) -> dict[str, int]:
+            rows = {row.name: row.pid for row in health_of(client).processes}
+            # `health` is up to a second old, and these get signals: they must be ours, and alive.
+            ours = all(name in rows and self._owns(rows[name]) for name in names)
+            return rows if ours else {}
+
         with self.client("pids") as client:
-            found = wait_for(lambda: _pids(client, names), f"processes {names} in health")
-        for name in names:  # these numbers get signals: they must be nobody else's
-            assert self._owns(found[name]), f"{name} {found[name]} is no process of this daemon"
-        return found
+            return wait_for(lambda: found(client), f"processes {names} in health")
 
     def health(self) -> pb.Health:
         """Return the newest `health`."""
@@ -277,8 +281,3 @@ def enough(seconds: float) -> Callable[[], bool]:
 def health_of(client: Client) -> pb.Health:
     """Ask for the newest `health`."""
     return client._query(HEALTH, pb.ModeRequest(), pb.Health())
-
-
-def _pids(client: Client, names: tuple[str, ...]) -> dict[str, int]:
-    found = {process.name: process.pid for process in health_of(client).processes}
-    return found if set(names) <= set(found) else {}
