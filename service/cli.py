@@ -69,6 +69,18 @@ def _info(arguments: argparse.Namespace) -> int:
     return info(arguments)
 
 
+def _validate(arguments: argparse.Namespace) -> int:
+    from service.commands_validate import validate
+
+    return validate(arguments)
+
+
+def _workspace(arguments: argparse.Namespace) -> int:
+    from service.commands_workspace import workspace
+
+    return workspace(arguments)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
@@ -78,6 +90,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_daemon(commands)
     _add_client(commands)
     _add_logs(commands)
+    _add_validate(commands)
+    _add_workspace(commands)
     return parser
 
 
@@ -168,6 +182,23 @@ def _add_logs(commands: Subparsers) -> None:
     info = _command(commands, "info", _info, "Say what is in a recorded session.")
     info.add_argument("log", type=Path)
     info.add_argument("--json", action="store_true")
+
+
+def _add_validate(commands: Subparsers) -> None:
+    help_text = "Compare the model with the paper's measurements."
+    validate = _command(commands, "validate", _validate, help_text)
+    validate.add_argument("what", choices=("table1",))
+    validate.add_argument("--table", type=Path, metavar="FILE.csv", help="another such table")
+    validate.add_argument("--json", action="store_true", help="one JSON object instead")
+
+
+def _add_workspace(commands: Subparsers) -> None:
+    workspace = _command(commands, "workspace", _workspace, "Where the tip can be, and how well.")
+    workspace.add_argument("--arm", choices=PRESETS, default="paper")
+    workspace.add_argument("--out", type=Path, metavar="DIR", help="write picture, mesh, samples")
+    workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
+    workspace.add_argument("--seed", type=int, default=0, help="seed of the random points")
+    workspace.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,24 +1,24 @@
 """Tip pose and Jacobian of a whole arm, compiled with CasADi for the tick.
 
 The same singularity-free form as :mod:`controllers.kinematics.constant_curvature`, written once
-more in CasADi symbols so that its derivative is exact; the tests hold the two against each other.
+more in CasADi symbols; the tests hold the two, and the derivative, against each other.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from controllers.arm import CHAMBER_ANGLES_RAD, Arm, Array
+from controllers.arm import Arm, Array
+from controllers.errors import InvalidInput
+from controllers.kinematics.constant_curvature import shapes_from_lengths
+from controllers.kinematics.smooth import Smooth, from_quarter, series
 
-#: Below this theta^2 (rad^2) S and C are summed as series; above, closed form. Both hold here.
-_SERIES_BELOW = 0.5
-_TERMS = 10
+#: Terms of the series of the quarter angle: 1e-10 at theta = 20 rad, full precision below 4 pi.
+_TERMS = 12
 
 
-@dataclass(frozen=True)
-class TipState:
+class TipState(NamedTuple):
     """What the tip does for given lengths. Views into buffers: valid until the next evaluation.
 
     ``position_m`` (3,), ``rotation`` (3, 3) from the twist-free tip frame to the base, and
@@ -31,59 +31,67 @@ class TipState:
     jacobian: Array
 
 
-def smooth_s_and_c(theta_squared: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """``S = sin(theta)/theta`` and ``C = (1 - cos(theta))/theta^2``, smooth at the straight arm."""
-    small = theta_squared < _SERIES_BELOW
-    safe = ca.if_else(small, 1.0, theta_squared)
-    theta = ca.sqrt(safe)
-    closed_s, closed_c = ca.sin(theta) / theta, (1.0 - ca.cos(theta)) / safe
-    series_s, series_c = ca.SX(0.0), ca.SX(0.0)
-    factorial = 1.0
-    for k in range(_TERMS):
-        factorial *= max(2 * k, 1) * (2 * k + 1)  # (2k+1)!
-        series_s += (-theta_squared) ** k / factorial
-        series_c += (-theta_squared) ** k / (factorial * (2 * k + 2))
-    return ca.if_else(small, series_s, closed_s), ca.if_else(small, series_c, closed_c)
+def symbolic_smooth(theta_squared: ca.SX) -> Smooth:
+    """S, C and their kin of :mod:`controllers.kinematics.smooth`, in CasADi symbols."""
+    x = 0.0625 * theta_squared
+    c, e = ca.SX(0), ca.SX(0)
+    for next_c, next_e in series(_TERMS):
+        c, e = c * x + next_c, e * x + next_e
+    return from_quarter(theta_squared, c, e)
 
 
 def symbolic_section(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Position (3) and rotation (3, 3) of a section's tip in its base, in CasADi symbols."""
-    theta_squared = u * u + v * v
-    s, c = smooth_s_and_c(theta_squared)
-    position = arc_length * ca.vertcat(u * c, v * c, s)
+    position, rotation, _ = _section_with_jacobian(arc_length, u, v)
+    return position, rotation
+
+
+def _section_with_jacobian(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Position, rotation and Jacobian (6, 3) over ``(L, u, v)``, in the base of the section.
+
+    The derivative in closed form, as in :mod:`controllers.kinematics.jacobians`.
+    """
+    f = symbolic_smooth(u * u + v * v)
+    uc, vc, us, vs = u * f.c, v * f.c, u * f.s, v * f.s
+    uuc, uvc, vvc, uve = u * uc, u * vc, v * vc, u * v * f.e
+    direction = ca.vertcat(uc, vc, f.s)
     rotation = ca.vertcat(
-        ca.horzcat(1 - u * u * c, -u * v * c, u * s),
-        ca.horzcat(-u * v * c, 1 - v * v * c, v * s),
-        ca.horzcat(-u * s, -v * s, 1 - theta_squared * c),
+        ca.horzcat(1 - uuc, -uvc, us),
+        ca.horzcat(-uvc, 1 - vvc, vs),
+        ca.horzcat(-us, -vs, 1 - uuc - vvc),
     )
-    return position, rotation
+    dc_u, dc_v = 2 * arc_length * f.dc * u, 2 * arc_length * f.dc * v
+    ds, along = 2 * arc_length * f.ds, arc_length * f.c
+    jacobian = ca.vertcat(
+        ca.horzcat(uc, along + u * dc_u, u * dc_v),
+        ca.horzcat(vc, u * dc_v, along + v * dc_v),
+        ca.horzcat(f.s, u * ds, v * ds),
+        ca.horzcat(ca.SX(1, 1), -uve, u * u * f.e - 1),
+        ca.horzcat(ca.SX(1, 1), 1 - v * v * f.e, uve),
+        ca.horzcat(ca.SX(1, 1), -vc, uc),
+    )
+    return arc_length * direction, rotation, jacobian
 
 
-def symbolic_tip(arm: Arm, lengths: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Position and rotation of the tip in the base, for ``lengths`` (n_chambers) in C order."""
-    position, rotation = ca.SX.zeros(3), ca.SX.eye(3)
-    cosines, sines = np.cos(CHAMBER_ANGLES_RAD), np.sin(CHAMBER_ANGLES_RAD)
-    for index, section in enumerate(arm.sections):
-        chambers = lengths[3 * index : 3 * index + 3]
-        factor = -2.0 / (3.0 * section.chamber_offset_m)
-        step, turn = symbolic_section(
-            ca.sum1(chambers) / 3.0,
-            factor * ca.dot(chambers, ca.DM(cosines)),
-            factor * ca.dot(chambers, ca.DM(sines)),
+def symbolic_tip(arm: Arm, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Position, rotation and Jacobian (6, n_chambers) of the tip, ``lengths`` in C order.
+
+    Walking from the tip to the base: a section turns what follows it and moves it by its lever.
+    """
+    position, rotation, columns = ca.SX(3, 1), ca.SX.eye(3), ca.SX(6, 0)
+    for index in reversed(range(arm.n_sections)):
+        rates = ca.sparsify(
+            ca.DM(shapes_from_lengths(np.eye(3), arm.sections[index].chamber_offset_m).T)
         )
-        position = position + rotation @ step
-        rotation = rotation @ turn
-    return position, rotation
-
-
-def _angular_jacobian(rotation: ca.SX, lengths: ca.SX) -> ca.SX:
-    """Rows of the angular velocity: the axial vector of ``dR R^T`` for every length."""
-    derivative = ca.jacobian(ca.vec(rotation), lengths)
-    columns = []
-    for index in range(lengths.numel()):
-        spin = ca.reshape(derivative[:, index], 3, 3) @ rotation.T
-        columns.append(ca.vertcat(spin[2, 1], spin[0, 2], spin[1, 0]))
-    return ca.horzcat(*columns)
+        shape = rates @ lengths[3 * index : 3 * index + 3]
+        step, turn, local = _section_with_jacobian(shape[0], shape[1], shape[2])
+        lever = turn @ position
+        linear = local[:3, :] - ca.skew(lever) @ local[3:, :]
+        here = ca.vertcat(linear, local[3:, :]) @ rates
+        after = ca.vertcat(turn @ columns[:3, :], turn @ columns[3:, :])
+        columns = ca.horzcat(here, after)
+        position, rotation = step + lever, turn @ rotation
+    return position, rotation, columns
 
 
 class CompiledKinematics:
@@ -91,23 +99,41 @@ class CompiledKinematics:
 
     def __init__(self, arm: Arm) -> None:
         lengths = ca.SX.sym("lengths", arm.n_chambers)
-        position, rotation = symbolic_tip(arm, lengths)
-        jacobian = ca.vertcat(ca.jacobian(position, lengths), _angular_jacobian(rotation, lengths))
-        dense = [ca.densify(expression) for expression in (position, rotation, jacobian)]
-        self._function = ca.Function("tip", [lengths], dense)
+        outputs = ca.cse([ca.densify(expression) for expression in symbolic_tip(arm, lengths)])
+        # CasADi is column-major: a transposed matrix lies in its buffer in C order.
+        transposed = [expression.T for expression in outputs]
+        self._function = ca.Function("tip", [lengths], transposed)
         buffer: Any  # CasADi's stubs do not know its own default arguments
         buffer, self._evaluate = self._function.buffer()
         self._buffer = buffer
-        self._lengths = np.zeros(arm.n_chambers)
-        # CasADi is column-major: the transposed C-order arrays are the matrices themselves.
-        self._outputs = [np.zeros(3), np.zeros((3, 3)), np.zeros((arm.n_chambers, 6))]
+        self._shape = (arm.n_sections, 3)
+        self._lengths = np.zeros(self._shape)
+        arrays = (np.zeros(3), np.zeros((3, 3)), np.zeros((6, arm.n_chambers)))
         self._buffer.set_arg(0, self._lengths.data)
-        for index, output in enumerate(self._outputs):
+        for index, output in enumerate(arrays):
             self._buffer.set_res(index, output.data)
-        self._state = TipState(self._outputs[0], self._outputs[1].T, self._outputs[2].T)
+        self._state = TipState(*arrays)
 
     def evaluate(self, lengths_m: Array) -> TipState:
-        """Evaluate at ``lengths_m`` (n_sections, 3). The result's arrays are reused next time."""
-        self._lengths[:] = lengths_m.reshape(-1)
+        """Evaluate at ``lengths_m`` (n_sections, 3). The result's arrays are reused next time.
+
+        Raises InvalidInput for another shape. The values are not checked: this is the tick's, whose
+        lengths are within limits, and a NaN goes through to the result.
+        """
+        if lengths_m.shape != self._shape:
+            self._refuse(lengths_m)
+        self._lengths[...] = lengths_m
         self._evaluate()
         return self._state
+
+    def fresh(self, lengths_m: Array) -> TipState:
+        """Evaluate as :meth:`evaluate` into arrays that belong to the caller."""
+        if lengths_m.shape != self._shape:
+            self._refuse(lengths_m)
+        self._lengths[...] = lengths_m
+        self._evaluate()
+        position_m, rotation, jacobian = self._state
+        return TipState(position_m.copy(), rotation.copy(), jacobian.copy())
+
+    def _refuse(self, lengths_m: Array) -> None:
+        raise InvalidInput(f"lengths_m has the shape {lengths_m.shape}: {self._shape} is needed")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.arm import Arm
+from controllers.errors import InvalidInput
 from controllers.kinematics.compiled import CompiledKinematics
 from controllers.kinematics.constant_curvature import tip_transform
 from tests.arms import ARMS, random_lengths, table1_arm, trunk_arm
@@ -79,3 +80,25 @@ def test_the_lengths_given_are_not_changed() -> None:
     before = lengths.copy()
     CompiledKinematics(trunk_arm()).evaluate(lengths)
     np.testing.assert_array_equal(lengths, before)
+
+
+@pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
+def test_fresh_results_are_the_callers_own(arm: Arm) -> None:
+    kinematics = CompiledKinematics(arm)
+    first, second = configurations(arm)[-2:]
+    kept = kinematics.fresh(first)
+    before = [array.copy() for array in kept]
+    again = kinematics.fresh(second)
+    for array, same, other, buffer in zip(
+        kept, before, again, kinematics.evaluate(second), strict=True
+    ):
+        np.testing.assert_array_equal(array, same)
+        np.testing.assert_array_equal(other, buffer)
+        assert not np.shares_memory(other, buffer)
+
+
+def test_lengths_of_another_arm_are_refused() -> None:
+    kinematics = CompiledKinematics(trunk_arm())
+    for evaluate in (kinematics.evaluate, kinematics.fresh):
+        with pytest.raises(InvalidInput, match=r"lengths_m has the shape \(1, 3\): \(3, 3\)"):
+            evaluate(table1_arm().rest_lengths_m)

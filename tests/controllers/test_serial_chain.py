@@ -1,5 +1,7 @@
 """The paper's equations against each other, against numbers and against the form that runs."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,12 @@ from hypothesis import strategies as st
 from controllers.errors import InvalidInput
 from controllers.kinematics.constant_curvature import section_transforms
 from controllers.kinematics.serial_chain import (
+    CHAIN,
+    VARIABLES,
+    chain_frames,
+    chain_transform,
     paper_transform,
+    propagated_jacobian,
     serial_jacobian,
     velocity_jacobian,
 )
@@ -94,6 +101,65 @@ def test_eq_1_is_a_rigid_motion(phi: float, theta: float, radius: float) -> None
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
     np.testing.assert_array_equal(transform[3], [0.0, 0.0, 0.0, 1.0])
+
+
+@given(PHI, THETA, RADIUS)
+def test_the_product_of_the_four_joints_is_eq_1(phi: float, theta: float, radius: float) -> None:
+    np.testing.assert_allclose(
+        chain_transform(phi, theta, radius),
+        paper_transform(phi, theta, radius),
+        rtol=0.0,
+        atol=1e-15 * (4 + 4 * radius),
+    )
+
+
+@given(PHI, THETA, RADIUS)
+def test_velocities_propagated_along_the_chain_are_eq_2(
+    phi: float, theta: float, radius: float
+) -> None:
+    np.testing.assert_allclose(
+        propagated_jacobian(phi, theta, radius),
+        velocity_jacobian(phi, theta, radius),
+        rtol=0.0,
+        atol=1e-14 * 9,
+    )
+
+
+@given(PHI, THETA, RADIUS)
+def test_the_chain_stands_where_the_paper_draws_it(phi: float, theta: float, radius: float) -> None:
+    frames = chain_frames(phi, theta, radius)
+    c, s = np.cos(phi), np.sin(phi)
+    tip = paper_transform(phi, theta, radius)
+    axes = [[0.0, 0.0, 1.0], [c, s, 0.0], [-s, c, 0.0], -tip[:3, 0]]
+    centre = radius * np.array([c, s, 0.0])
+    origins = [np.zeros(3), np.zeros(3), centre, centre, tip[:3, 3]]
+    np.testing.assert_allclose(frames.axes, axes, atol=1e-15)
+    np.testing.assert_allclose(frames.origins_m, origins, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(frames.origins_m[4] - centre), radius, rtol=1e-12)
+
+
+def test_the_coupling_of_the_chain_is_mutual_and_of_the_prismatic_joints() -> None:
+    coupled = {
+        number: joint.coupled_with for number, joint in enumerate(CHAIN, 1) if joint.coupled_with
+    }
+    assert coupled == {2: 4, 4: 2}
+    for number, other in coupled.items():
+        assert CHAIN[number - 1].variable == CHAIN[other - 1].variable
+        assert CHAIN[number - 1].kind == "prismatic"
+    assert {joint.variable for joint in CHAIN} == set(VARIABLES)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [chain_transform, paper_transform, velocity_jacobian, propagated_jacobian, serial_jacobian],
+)
+def test_a_batch_of_arcs_is_each_of_them(function: Callable[..., np.ndarray]) -> None:
+    rng = np.random.default_rng(0)
+    phi, theta = rng.uniform(-3.0, 3.0, (4, 1)), rng.uniform(0.1, 3.0, 5)
+    together = function(phi, theta, 0.2)
+    assert together.shape[:2] == (4, 5)
+    for i, j in np.ndindex(4, 5):
+        np.testing.assert_allclose(together[i, j], function(phi[i, 0], theta[j], 0.2), atol=1e-15)
 
 
 @pytest.mark.parametrize("function", [paper_transform, velocity_jacobian, serial_jacobian])

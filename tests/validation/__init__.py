@@ -1,0 +1,1 @@
+"""What is compared with measurements and with other solvers, not with itself."""
