@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo test check proto lock clean
+.PHONY: setup demo test check validate bench-setup proto lock clean
 
 setup: $(READY)
 
@@ -30,13 +30,29 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
+# The finite elements are recorded; `python -m tests.validation.finite_elements` solves them anew.
+validate: $(VENV)/.ready-validate
+	$(BIN)/python -m service.validation.report --out docs
+
+$(VENV)/.ready-validate: requirements-validate.lock $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-validate.lock
+	@touch $@
+
+# The peers that the benchmarks compare with; nothing else needs them.
+bench-setup: setup
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
+
 proto: setup
 	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. logs/schema/pneuarm.proto
 
 # Needs uv; only for whoever changes the dependencies.
+LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
+    --no-emit-index-url --no-annotate --no-header --group dev
 lock:
-	uv pip compile pyproject.toml --group dev --universal --python-version 3.11 --generate-hashes \
-	    --no-emit-index-url --no-annotate --no-header --output-file requirements.lock
+	$(LOCK) --output-file requirements.lock
+	$(LOCK) --group validate --constraint requirements.lock --output-file requirements-validate.lock
+	$(LOCK) --group bench --constraint requirements.lock --output-file requirements-bench.lock
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from controllers.arm import Arm, Array
 from controllers.kinematics.compiled import TipState
 from controllers.limits.bend import BendLimit

@@ -76,7 +76,7 @@ def test_recorder_killed_is_revived_and_nothing_is_missing(daemon: Daemon, clien
     summary = caught_up(daemon, client)
     assert summary.missing_ticks == 0
     assert summary.parts >= 2
-    assert daemon.codes().count("recorder_restarted") == 2
+    wait_for(lambda: daemon.codes().count("recorder_restarted") == 2, "both restarts in the log")
     assert lost(client) == 0
 
 
