@@ -4,6 +4,7 @@ It runs in its own process, so that compression and a slow disk stall nobody. Wh
 written waits in the rings; where the disk is full it keeps trying, and says so.
 """
 
+import contextlib
 import os
 import time
 from dataclasses import dataclass
@@ -78,6 +79,8 @@ class Recorder:
         part = Part(path, self._info.arm)
         part.add_metadata("pneuarm", {"config_toml": self._info.config_toml})
         part.write(INFO, self._info.SerializeToString(), self._time_unix_ns)
+        with contextlib.suppress(OSError):  # the flush to come tries again, and reports
+            part.flush()  # from here on the file reads as a log
         self._next_part += 1
         self._opened_s = self._flushed_s = time.monotonic()
         return part

@@ -97,6 +97,11 @@ class Child:
         self._process.join(patience_s)
         return not self._process.is_alive()
 
+    @property
+    def failed(self) -> bool:
+        """Whether it has ended otherwise than it should."""
+        return self._process is not None and self._process.exitcode not in (None, 0)
+
     def kill(self) -> None:
         """Kill it, stopped or not."""
         if self._process is not None:

@@ -6,6 +6,8 @@ import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from controllers.errors import TargetRejected
+from controllers.kinematics.workspace import Workspace
+from controllers.targets import PositionTarget, Target
 from logs.codec import decode
 from logs.schema import pneuarm_pb2 as pb
 from logs.topics import TARGET, TIP_POSE
@@ -29,6 +31,9 @@ class Inbox:
         control = shared.configuration.control
         self._stream, self._lease, self._publisher, self._notes = stream, lease, publisher, notes
         self._checker = TargetChecker(shared.configuration.build_arm())
+        arm = shared.configuration.build_arm()
+        self._workspace = Workspace(arm) if arm.n_sections == 1 else None
+        self._out_of_reach = False
         self._rate_hz = control.rate_hz
         self._stale_s = control.target_timeout_ms * 1e-3
 
@@ -50,8 +55,29 @@ class Inbox:
         except TargetRejected as error:
             self._notes.reject(TARGET.key, str(error), payload, message.client_id)
             return
+        self._tell_if_out_of_reach(target, message.client_id)
         message.lease_secret = ""  # the log is no place for it
         self._notes.log(TARGET, message, received_ns)
+
+    def _tell_if_out_of_reach(self, target: Target, client: str) -> None:
+        """Say once that a position is out of reach, why, and which point is nearest.
+
+        Only for one section, where the workspace is known exactly and in microseconds; with more
+        the arm itself finds out, and its state says so.
+        """
+        if self._workspace is None or not isinstance(target, PositionTarget):
+            return
+        answer = self._workspace.is_reachable(target.position_m)
+        if not answer.reachable and not self._out_of_reach:
+            names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
+            nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
+            self._notes.tell(
+                "out_of_reach",
+                f"the target is out of reach: {names} binds; the nearest reachable point is "
+                f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
+                client,
+            )
+        self._out_of_reach = not answer.reachable
 
     def _check_fresh(self, state_sequence: int) -> None:
         newest = self._publisher.newest_sequence

@@ -33,16 +33,22 @@ class Notes:
 
     def reject(self, key: str, reason: str, payload: bytes, client: str) -> None:
         """Tell why a message changed nothing."""
+        shown = self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES]
+        with self.lock:
+            self.rejected += 1
+            self.tell("rejected", f"{key}: {reason}", client, shown)
+
+    def tell(self, code: str, text: str, client: str, payload: bytes = b"") -> None:
+        """Write down a warning, for everybody to read."""
         event = pb.Event(
             time_unix_ns=self._shared.unix_ns(time.monotonic_ns()),
             level=pb.WARNING,
             source="gateway",
-            code="rejected",
-            text=f"{key}: {reason}"[:400],
+            code=code,
+            text=text[:400],
             client_id=client[:64],
             mode=self._publisher.newest_mode,
-            payload=self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES],
+            payload=payload,
         )
         with self.lock:
-            self.rejected += 1
             self._messages.write(EVENT, event, event.time_unix_ns)

@@ -5,7 +5,6 @@ from multiprocessing.connection import Connection
 
 from controllers.errors import LogError
 from logs.recorder import Recorder, RecorderSettings
-from service import realtime
 from service.config import log_directory
 from service.process import Shared, ignore_terminal_signals, parent_is_alive
 
@@ -36,7 +35,6 @@ def settings(shared: Shared) -> RecorderSettings:
 def main(shared: Shared, end: Connection) -> None:
     """Entry point of the process; ends when told through ``end``, or when its parent is gone."""
     ignore_terminal_signals()
-    realtime.step_back(5)
     recorder = Recorder(settings(shared), shared.info, shared.rings, shared.recorder)
     while not end.poll() and parent_is_alive():
         if recorder.step() == 0:

@@ -129,7 +129,8 @@ class Supervisor:
             status = self._watch()
         finally:
             self._end_children()
-        return status
+        recorder = self._children.get("recorder")
+        return 1 if status == 0 and recorder is not None and recorder.failed else status
 
     def _on_signal(self, number: int, frame: object) -> None:
         self._ending = True
