@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Arm, Array
+from controllers.arm import Arm, Array, Section
 from controllers.errors import InvalidInput
-from controllers.kinematics.constant_curvature import shapes_from_lengths
 from controllers.kinematics.smooth import Smooth, from_quarter, series
 
 #: Terms of the series of the quarter angle: 1e-10 at theta = 20 rad, full precision below 4 pi.
@@ -73,6 +72,22 @@ def _section_with_jacobian(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX
     return arc_length * direction, rotation, jacobian
 
 
+def _shape(lengths: ca.SX, section: Section) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """``(L, u, v)`` of the three lengths of a section."""
+    first, second, third = lengths[0], lengths[1], lengths[2]
+    u = ((second - first) + (third - first)) / (3.0 * section.chamber_offset_m)
+    v = (third - second) / (np.sqrt(3.0) * section.chamber_offset_m)
+    return (first + second + third) / 3.0, u, v
+
+
+def _over_lengths(jacobian: ca.SX, section: Section) -> ca.SX:
+    """Columns over ``(L, u, v)`` turned into columns over the three lengths."""
+    d = section.chamber_offset_m
+    mean, along = jacobian[:, 0] / 3.0, jacobian[:, 1] / (3.0 * d)
+    across, side = jacobian[:, 2] / (np.sqrt(3.0) * d), mean + along
+    return ca.horzcat(mean - 2.0 * along, side - across, side + across)
+
+
 def symbolic_tip(arm: Arm, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Position, rotation and Jacobian (6, n_chambers) of the tip, ``lengths`` in C order.
 
@@ -80,14 +95,11 @@ def symbolic_tip(arm: Arm, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """
     position, rotation, columns = ca.SX(3, 1), ca.SX.eye(3), ca.SX(6, 0)
     for index in reversed(range(arm.n_sections)):
-        rates = ca.sparsify(
-            ca.DM(shapes_from_lengths(np.eye(3), arm.sections[index].chamber_offset_m).T)
-        )
-        shape = rates @ lengths[3 * index : 3 * index + 3]
-        step, turn, local = _section_with_jacobian(shape[0], shape[1], shape[2])
+        shape = _shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
+        step, turn, local = _section_with_jacobian(*shape)
         lever = turn @ position
         linear = local[:3, :] - ca.skew(lever) @ local[3:, :]
-        here = ca.vertcat(linear, local[3:, :]) @ rates
+        here = _over_lengths(ca.vertcat(linear, local[3:, :]), arm.sections[index])
         after = ca.vertcat(turn @ columns[:3, :], turn @ columns[3:, :])
         columns = ca.horzcat(here, after)
         position, rotation = step + lever, turn @ rotation
@@ -99,20 +111,21 @@ class CompiledKinematics:
 
     def __init__(self, arm: Arm) -> None:
         lengths = ca.SX.sym("lengths", arm.n_chambers)
-        outputs = ca.cse([ca.densify(expression) for expression in symbolic_tip(arm, lengths)])
+        position, rotation, jacobian = symbolic_tip(arm, lengths)
+        transform = ca.vertcat(ca.horzcat(rotation, position), ca.DM([[0.0, 0.0, 0.0, 1.0]]))
         # CasADi is column-major: a transposed matrix lies in its buffer in C order.
-        transposed = [expression.T for expression in outputs]
+        transposed = ca.cse([ca.densify(matrix.T) for matrix in (transform, jacobian)])
         self._function = ca.Function("tip", [lengths], transposed)
         buffer: Any  # CasADi's stubs do not know its own default arguments
         buffer, self._evaluate = self._function.buffer()
         self._buffer = buffer
         self._shape = (arm.n_sections, 3)
         self._lengths = np.zeros(self._shape)
-        arrays = (np.zeros(3), np.zeros((3, 3)), np.zeros((6, arm.n_chambers)))
+        self._transform, self._jacobian = np.zeros((4, 4)), np.zeros((6, arm.n_chambers))
         self._buffer.set_arg(0, self._lengths.data)
-        for index, output in enumerate(arrays):
-            self._buffer.set_res(index, output.data)
-        self._state = TipState(*arrays)
+        self._buffer.set_res(0, self._transform.data)
+        self._buffer.set_res(1, self._jacobian.data)
+        self._state = TipState(self._transform[:3, 3], self._transform[:3, :3], self._jacobian)
 
     def evaluate(self, lengths_m: Array) -> TipState:
         """Evaluate at ``lengths_m`` (n_sections, 3). The result's arrays are reused next time.
@@ -126,14 +139,16 @@ class CompiledKinematics:
         self._evaluate()
         return self._state
 
-    def fresh(self, lengths_m: Array) -> TipState:
-        """Evaluate as :meth:`evaluate` into arrays that belong to the caller."""
+    def fresh(self, lengths_m: Array) -> tuple[Array, Array]:
+        """Tip transform (4, 4) and Jacobian (6, n_chambers), in arrays that belong to the caller.
+
+        As :meth:`evaluate` in everything else.
+        """
         if lengths_m.shape != self._shape:
             self._refuse(lengths_m)
         self._lengths[...] = lengths_m
         self._evaluate()
-        position_m, rotation, jacobian = self._state
-        return TipState(position_m.copy(), rotation.copy(), jacobian.copy())
+        return self._transform.copy(), self._jacobian.copy()
 
     def _refuse(self, lengths_m: Array) -> None:
         raise InvalidInput(f"lengths_m has the shape {lengths_m.shape}: {self._shape} is needed")

@@ -88,13 +88,16 @@ def test_fresh_results_are_the_callers_own(arm: Arm) -> None:
     first, second = configurations(arm)[-2:]
     kept = kinematics.fresh(first)
     before = [array.copy() for array in kept]
-    again = kinematics.fresh(second)
-    for array, same, other, buffer in zip(
-        kept, before, again, kinematics.evaluate(second), strict=True
-    ):
+    transform, jacobian = kinematics.fresh(second)
+    for array, same in zip(kept, before, strict=True):
         np.testing.assert_array_equal(array, same)
-        np.testing.assert_array_equal(other, buffer)
-        assert not np.shares_memory(other, buffer)
+    tip = kinematics.evaluate(second)
+    np.testing.assert_allclose(transform, tip_transform(arm, second), atol=1e-13)
+    np.testing.assert_array_equal(transform[:3, 3], tip.position_m)
+    np.testing.assert_array_equal(transform[:3, :3], tip.rotation)
+    np.testing.assert_array_equal(jacobian, tip.jacobian)
+    assert not np.shares_memory(jacobian, tip.jacobian)
+    assert not np.shares_memory(transform, tip.rotation)
 
 
 def test_lengths_of_another_arm_are_refused() -> None:
