@@ -108,12 +108,12 @@ def test_a_damaged_file_is_read_or_refused(
         assert is_finished(repair(path)[0]) or path.with_suffix(".mcap.broken").exists()
 
 
-@pytest.mark.parametrize("chunks", range(CHUNKS + 1))
+@pytest.mark.parametrize("chunks", range(CHUNKS + 2))
 def test_a_broken_file_is_mended_with_everything_that_was_whole(
     whole: Whole, tmp_path: Path, chunks: int
 ) -> None:
     path = tmp_path / "20260102T000000Z-paper.mcap"
-    end = whole.ends[chunks] if chunks < CHUNKS else len(whole.content)
+    end = whole.ends[chunks] if chunks <= CHUNKS else len(whole.content)
     path.write_bytes(whole.content[: end - 1])
     assert unfinished(tmp_path) == [path]
     mended, messages = repair(path)
