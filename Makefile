@@ -32,7 +32,7 @@ check: setup
 
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
 # The finite elements are recorded; `python -m tests.validation.finite_elements` solves them anew.
-validate: $(VENV)/.ready-validate
+validate: $(VENV)/.ready-validate bench-setup
 	$(BIN)/python -m service.validation.report --out docs
 
 $(VENV)/.ready-validate: requirements-validate.lock $(READY)

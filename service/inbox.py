@@ -67,8 +67,9 @@ class Inbox:
         """
         if self._workspace is None or not isinstance(target, PositionTarget):
             return
-        answer = self._workspace.is_reachable(target.position_m)
-        if not answer.reachable and not self._out_of_reach:
+        outside = not bool(self._workspace.contains(target.position_m))
+        if outside and not self._out_of_reach:  # finding the nearest takes milliseconds
+            answer = self._workspace.is_reachable(target.position_m)
             names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
             nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
             self._notes.tell(
@@ -77,7 +78,7 @@ class Inbox:
                 f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
                 client,
             )
-        self._out_of_reach = not answer.reachable
+        self._out_of_reach = outside
 
     def _check_fresh(self, state_sequence: int) -> None:
         newest = self._publisher.newest_sequence

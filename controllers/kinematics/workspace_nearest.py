@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from controllers.arm import Array
 from controllers.kinematics.workspace_region import (
@@ -26,9 +27,11 @@ from controllers.kinematics.workspace_region import (
 Cost = Callable[[Array], Array]
 
 _CELLS = 24
-_FOLLOWED = 8  # local minima
+_FOLLOWED = 4  # local minima of a sheet
 _SMALLEST_STEP = 1e-8  # of a sheet: nanometres
 _ROUNDS = 200
+_POLISHED = 2
+_SIMPLEX = np.array([[0.01, 0.003], [0.003, -0.01]])
 _COMPASS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)], float)
 
 
@@ -60,13 +63,41 @@ class BoundarySearch:
     def best(self, cost: Cost) -> BoundaryPoint:
         """Return the point of the boundary in the wedge with the least cost."""
         values = cost(self._points)
-        flat = np.flatnonzero(_is_local_minimum(values))
-        chosen = flat[np.argsort(values.flat[flat], kind="stable")[:_FOLLOWED]]
+        minima = np.where(_is_local_minimum(values), values, np.inf).reshape(len(Sheet), -1)
+        # From every sheet: a sheet that is a mere line has many equal minima, and would crowd out.
+        best = np.argsort(minima, axis=1, kind="stable")[:, :_FOLLOWED]
+        chosen = (best + minima.shape[1] * np.arange(len(Sheet))[:, None]).reshape(-1)
+        chosen = chosen[np.isfinite(minima.reshape(-1)[chosen])]
         sheet = self._sheet.flat[chosen]
         place, value = self._descend(cost, sheet, self._place[chosen])
-        winner = int(np.argmin(value))
-        position = self._at(sheet[winner], *place[winner])
-        return BoundaryPoint(position, float(value[winner]))
+        polished = [
+            self._polish(cost, sheet[index], place[index])
+            for index in np.argsort(value)[:_POLISHED]
+        ]
+        return min(polished, key=lambda point: point.cost)
+
+    def _polish(self, cost: Cost, sheet: Sheets, place: Array) -> BoundaryPoint:
+        """Follow a long narrow valley that lies across the compass to its bottom."""
+
+        def at(place: Array) -> Array:
+            return self._at(sheet, *place)
+
+        corners = np.clip(place + _SIMPLEX, 0.0, 1.0)
+        corners = np.where(corners == place, np.clip(place - _SIMPLEX, 0.0, 1.0), corners)
+        options = {
+            "initial_simplex": np.vstack([place, corners]),
+            "xatol": _SMALLEST_STEP,
+            "fatol": 0.0,
+            "maxfev": _ROUNDS,
+        }
+        found = minimize(
+            lambda place: float(cost(at(place))),
+            place,
+            method="Nelder-Mead",
+            bounds=((0.0, 1.0), (0.0, 1.0)),
+            options=options,
+        )
+        return BoundaryPoint(at(found.x), float(found.fun))
 
     def _descend(self, cost: Cost, sheet: Sheets, place: Array) -> tuple[Array, Array]:
         """Compass search from places ``(n, 2)``: to the best of 8 neighbours, or half the step."""
