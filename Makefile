@@ -32,12 +32,8 @@ check: setup
 
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
 # The finite elements are recorded; `python -m tests.validation.finite_elements` solves them anew.
-validate: $(VENV)/.ready-validate bench-setup
+validate: bench-setup
 	$(BIN)/python -m service.validation.report --out docs
-
-$(VENV)/.ready-validate: requirements-validate.lock $(READY)
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-validate.lock
-	@touch $@
 
 # The peers that the benchmarks compare with; nothing else needs them.
 bench-setup: setup
@@ -51,7 +47,6 @@ LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --genera
     --no-emit-index-url --no-annotate --no-header --group dev
 lock:
 	$(LOCK) --output-file requirements.lock
-	$(LOCK) --group validate --constraint requirements.lock --output-file requirements-validate.lock
 	$(LOCK) --group bench --constraint requirements.lock --output-file requirements-bench.lock
 
 clean:

@@ -1,5 +1,6 @@
 """What every device is to the daemon."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,13 +11,21 @@ from controllers.arm import Array
 class Measurement:
     """One reading of the device; arrays of shape ``(n_sections, 3)``, NaN where not measured.
 
-    ``true_tip`` is the tip pose ``(position_m (3,), rotation (3, 3))`` that only a simulated arm
-    knows; it is recorded, never used for control.
+    ``taken_s`` is the time of the reading on the loop's clock, None where it was taken for this
+    very call. ``setpoints_pa`` is what the device says it was told, ``supply_pa`` the gauge
+    pressure before its valves, ``stop_pressed`` its own stop input, and ``complaints`` its
+    diagnostics in words. ``true_tip`` is the tip pose ``(position_m (3,), rotation (3, 3))`` that
+    only a simulated arm knows; it is recorded, never used for control.
     """
 
     pressures_pa: Array
     lengths_m: Array
     true_tip: tuple[Array, Array] | None = None
+    taken_s: float | None = None
+    setpoints_pa: Array | None = None
+    supply_pa: float = math.nan
+    stop_pressed: bool = False
+    complaints: tuple[str, ...] = ()
 
 
 class Hardware(Protocol):

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,7 @@ def workspace(arguments: argparse.Namespace) -> int:
 
 
 def _write(folder: Path, summary: Summary) -> list[Path]:
-    """Write all files into a folder, which is made; without matplotlib all but the picture."""
+    """Write all files into a folder, which is made."""
     from service.workspace_files import write_npz, write_ply
     from service.workspace_picture import write_png
     from service.workspace_scene import write_rrd
@@ -44,9 +43,6 @@ def _write(folder: Path, summary: Summary) -> list[Path]:
         write_png(paths[3], summary)
     except OSError as error:
         raise ConfigurationError(f"--out {folder}: {error.strerror or error}") from error
-    except ConfigurationError as error:
-        print(f"pneuarm: {error}", file=sys.stderr)
-        return paths[:3]
     return paths
 
 

@@ -1,17 +1,12 @@
-"""A workspace as a picture, after the paper's Fig. 3: from the side, with the arm drawn inside.
+"""A workspace as a picture, after the paper's Fig. 3: from the side, with the arm drawn inside."""
 
-Needs matplotlib, which nothing else of pneuarm needs.
-"""
-
-import importlib
-import sys
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 
 from controllers.arm import Array
-from controllers.errors import ConfigurationError
 from controllers.kinematics.workspace_region import SectionRegion
 from controllers.kinematics.workspace_sampling import Samples, samples_of
 from controllers.kinematics.workspace_summary import Summary
@@ -24,23 +19,11 @@ _FILL, _EDGE = "#d4e4f1", "#4a7ba6"
 _GRID = 220
 
 
-def load_matplotlib() -> Any:
-    """Return matplotlib, set up to draw without a display; ConfigurationError if it is missing."""
-    try:
-        matplotlib = importlib.import_module("matplotlib")
-    except ModuleNotFoundError as error:
-        raise ConfigurationError(
-            "no picture, because matplotlib is not installed; install it with: "
-            f"{sys.executable} -m pip install matplotlib"
-        ) from error
-    matplotlib.use("Agg")
-    return matplotlib
-
-
 def write_png(path: Path, summary: Summary) -> None:
     """Draw the arms inside the workspace, and beside it the manipulability; both from the side."""
-    load_matplotlib()
-    pyplot = importlib.import_module("matplotlib.pyplot")
+    matplotlib.use("Agg")  # no display is needed
+    from matplotlib import pyplot
+
     figure, (left, right) = pyplot.subplots(
         1, 2, figsize=(15, 7.5), layout="constrained", sharex=True, sharey=True
     )
@@ -65,11 +48,14 @@ def _title(summary: Summary) -> str:
 
 def _outline(axes: Any, summary: Summary) -> None:
     """Fill what the surface covers seen along y; its section with the plane y = 0 as a line."""
-    collections = importlib.import_module("matplotlib.collections")
+    from matplotlib import collections
+
     side = _MM * summary.mesh.corners_m[:, :, [0, 2]]
-    axes.add_collection(collections.PolyCollection(side, facecolor=_FILL, edgecolor=_FILL, lw=0.3))
+    axes.add_collection(
+        collections.PolyCollection(list(side), facecolor=_FILL, edgecolor=_FILL, lw=0.3)
+    )
     cut = _MM * plane_section(summary.mesh.corners_m)[:, :, [0, 2]]
-    axes.add_collection(collections.LineCollection(cut, colors=_EDGE, linewidths=1.4))
+    axes.add_collection(collections.LineCollection(list(cut), colors=_EDGE, linewidths=1.4))
 
 
 def plane_section(corners_m: Array) -> Array:

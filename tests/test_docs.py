@@ -14,6 +14,7 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from service import config
 from service.mode import TABLE, Mode, ModeEvent
+from service.tables import arm, control, hardware, outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -22,14 +23,14 @@ PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
 #: Heading of every table of the configuration, and the model that reads it.
 TABLES: dict[str, type[BaseModel]] = {
     "Top level": config.Configuration,
-    "`[arm]`": config.ArmConfig,
-    "`[[arm.sections]]`": config.SectionConfig,
-    "`[control]`": config.ControlConfig,
-    "`[hardware]`": config.HardwareConfig,
-    "`[simulator]`": config.SimulatorConfig,
-    "`[zenoh]`": config.ZenohConfig,
-    "`[rerun]`": config.RerunConfig,
-    "`[log]`": config.LogConfig,
+    "`[arm]`": arm.ArmConfig,
+    "`[[arm.sections]]`": arm.SectionConfig,
+    "`[control]`": control.ControlConfig,
+    "`[hardware]`": hardware.HardwareConfig,
+    "`[simulator]`": hardware.SimulatorConfig,
+    "`[zenoh]`": outputs.ZenohConfig,
+    "`[rerun]`": outputs.RerunConfig,
+    "`[log]`": outputs.LogConfig,
 }
 KEYS = [(heading, key) for heading, model in TABLES.items() for key in model.model_fields]
 
@@ -117,7 +118,7 @@ def test_the_built_in_arms_are_described_as_they_are(preset: str) -> None:
     table = rows(section("configuration.md", "The built-in arms"))
     column = ["paper", "table1", "trunk"].index(preset) + 1
     loaded = config.load(None, preset)
-    for key in set(table) & set(config.SectionConfig.model_fields):
+    for key in set(table) & set(arm.SectionConfig.model_fields):
         values = {f"{getattr(part, key):g}" for part in loaded.arm.sections}
         assert values == {table[key][column].removesuffix(" each")}
     assert table["rate_hz"][column] == f"{loaded.control.rate_hz:g}"

@@ -31,7 +31,7 @@ def sweep(arm: Arm, low_rad: float, count: int = _BENDS) -> tuple[Array, Array]:
 
 
 def draw(arm: Arm, weight_over_bending_per_m3: float, path: Path) -> None:
-    """Write the picture as PNG; needs matplotlib."""
+    """Write the picture as PNG."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -141,7 +141,7 @@ def write_document(directory: Path, sections: tuple[Section, ...] = SECTIONS) ->
 
 
 def draw_pictures(directory: Path) -> None:
-    """Draw the picture of the models into ``directory``; needs matplotlib."""
+    """Draw the picture of the models into ``directory``."""
     from service.validation.models_picture import draw
 
     directory.mkdir(parents=True, exist_ok=True)

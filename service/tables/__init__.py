@@ -1,0 +1,1 @@
+"""The tables of a configuration file: every key, its unit and its bounds."""

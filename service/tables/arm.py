@@ -1,0 +1,58 @@
+"""The arm: its sections and their limits."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from controllers.arm import Section
+from service.tables.table import BAR, MM, Finite, Positive, Table
+
+
+class SectionConfig(Table):
+    """One section of the arm."""
+
+    rest_length_mm: Positive
+    chamber_offset_mm: Positive
+    length_min_mm: Positive
+    length_max_mm: Positive
+    bend_max_deg: Annotated[float, Field(gt=0, le=350)]
+    length_rate_max_mm_s: Positive
+    pressure_min_bar: Annotated[float, Field(ge=-1.0, le=0.0)]
+    pressure_max_bar: Annotated[float, Field(gt=0.0, le=10.0)]
+    pressure_slew_max_bar_s: Positive
+    lengthening_mm_per_bar: Positive
+    softening_mm_per_bar2: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+
+    @model_validator(mode="after")
+    def _bounds_in_order(self) -> "SectionConfig":
+        if not self.length_min_mm < self.rest_length_mm < self.length_max_mm:
+            raise ValueError(
+                f"length_min_mm = {self.length_min_mm:g}, rest_length_mm = "
+                f"{self.rest_length_mm:g} and length_max_mm = {self.length_max_mm:g} "
+                "must increase in this order"
+            )
+        return self
+
+    def section(self) -> Section:
+        """Return the section in SI units."""
+        return Section(
+            rest_length_m=self.rest_length_mm * MM,
+            chamber_offset_m=self.chamber_offset_mm * MM,
+            length_min_m=self.length_min_mm * MM,
+            length_max_m=self.length_max_mm * MM,
+            bend_max_rad=self.bend_max_deg * 0.017453292519943295,
+            length_rate_max_m_s=self.length_rate_max_mm_s * MM,
+            pressure_min_pa=self.pressure_min_bar * BAR,
+            pressure_max_pa=self.pressure_max_bar * BAR,
+            pressure_slew_max_pa_s=self.pressure_slew_max_bar_s * BAR,
+            lengthening_m_per_pa=self.lengthening_mm_per_bar * MM / BAR,
+            softening_m_per_pa2=self.softening_mm_per_bar2 * MM / BAR**2,
+        )
+
+
+class ArmConfig(Table):
+    """The arm: its name on the wire, gravity in its base frame, its sections from the base on."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
+    gravity_m_s2: Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
+    sections: Annotated[tuple[SectionConfig, ...], Field(min_length=1, max_length=16, strict=False)]

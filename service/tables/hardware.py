@@ -1,0 +1,20 @@
+"""The device that moves the air."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from service.tables.table import Table
+
+
+class HardwareConfig(Table):
+    """The device that moves the air. ``device`` empty means one simulator an arm."""
+
+    adapter: Literal["simulator"] = "simulator"
+    device: Annotated[str, Field(max_length=64, pattern=r"^[\x20-\x7e]*$")] = ""
+
+
+class SimulatorConfig(Table):
+    """The simulated arm: every parameter is drawn from the seed."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
