@@ -12,7 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controllers.arm import Arm, Array
+from hardware.channels import Channels
+from hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
+from hardware.ctrl_p.emulator import CtrlPEmulator
+from hardware.ctrl_p.protocol import STEP_PA as CTRL_P_STEP_PA
+from hardware.emulation import EmulatedArm
 from hardware.interface import Hardware
+from hardware.pseudo_terminal import PseudoTerminal
 from hardware.simulator.adapter import SimulatedArm
 from hardware.simulator.parameters import SimulatorParameters
 from service.config import load
@@ -112,9 +118,48 @@ def simulator(arm: Arm) -> Iterator[Bench]:
     yield bench
 
 
+@contextmanager
+def ctrl_p(arm: Arm) -> Iterator[Bench]:
+    """A Ctrl-P controller with eight channels, wired from the last one down."""
+    valves = tuple(range(7, 7 - arm.n_chambers, -1))
+    emulated = EmulatedArm(arm, 0)
+    emulator = CtrlPEmulator(emulated, Channels(arm, 8, valves, "valves"))
+    with PseudoTerminal(emulator) as terminal:
+        settings = CtrlPSettings(str(terminal.path), valves, telemetry_s=0.01)
+        hardware = CtrlP(arm, settings)
+        yield serial_bench(arm, hardware, emulated, terminal, CTRL_P_STEP_PA)
+
+
+def serial_bench(
+    arm: Arm,
+    hardware: Hardware,
+    emulated: EmulatedArm,
+    terminal: PseudoTerminal,
+    resolution_pa: float,
+) -> Bench:
+    """Put a serial device on the bench; what it does with a command takes it some passes."""
+
+    def told_pa() -> Array:
+        time.sleep(0.05)
+        with terminal.lock:
+            return emulated.setpoints_pa.copy()
+
+    return Bench(
+        arm,
+        hardware,
+        told_pa,
+        resolution_pa,
+        unplug=terminal.unplug,
+        plug=terminal.plug,
+        abandon=lambda: None,  # a host that hangs sends nothing more
+        clock=RealClock(),
+    )
+
+
 #: Every adapter by its name in `[hardware] adapter`.
 DEVICES: dict[str, Factory] = {
     "simulator": simulator,
+    "ctrl-p": ctrl_p,
 }
 
 #: How far ``told_pa`` may be from what was sent, in Pa: the simulator has real valves.
