@@ -57,7 +57,8 @@ class Controller:
         self._limits = Limits(arm)
         self._pressure_map = PressureMap(arm)
         self._kinematics = CompiledKinematics(arm)
-        self._tip = self._kinematics.evaluate(self.lengths_m)
+        self._offset_m, self._turn = np.zeros(3), np.eye(3)
+        self._model_tip = self._kinematics.evaluate(self.lengths_m)
         self._laws: dict[LawName, Law] = {
             LawName.RESOLVED_RATE: ResolvedRate(self._limits),
             LawName.QP_IK: QpIk(arm, self._limits),
@@ -84,7 +85,7 @@ class Controller:
     def start_from(self, pressures_pa: Array) -> None:
         """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
         self.lengths_m = self._limits.clip(self._pressure_map.lengths_m(pressures_pa))
-        self._tip = self._kinematics.evaluate(self.lengths_m)
+        self._model_tip = self._kinematics.evaluate(self.lengths_m)
         self.set_target(None)
 
     def set_target(self, target: Target | None) -> None:
@@ -108,7 +109,7 @@ class Controller:
         gain, speed = self.settings.gain_per_s, self.settings.tip_speed_max_m_s
         match target:
             case PositionTarget():
-                return TipPosition(target.position_m, gain, speed)
+                return TipPosition(target.position_m, gain, speed, target.velocity_m_s)
             case PoseTarget():
                 rotation = rotation_from_quaternion(target.quaternion_xyzw)
                 return TipPose(target.position_m, rotation, gain, speed)
@@ -125,20 +126,37 @@ class Controller:
                 lengths = self._pressure_map.lengths_m(target.pressures_pa)
                 return ChamberLengths(self._limits.length.clip(lengths), gain)
 
-    def step(self, dt_s: float) -> TipState:
-        """Move the commanded lengths by one tick; return the tip they stand for.
+    def set_correction(self, offset_m: Array, rotation: Array) -> None:
+        """Say by how much the tip is elsewhere than the model has it, from now on.
 
-        The result's arrays are reused by the next call.
+        The laws then see the tip at ``p(q) + offset_m`` (3,), turned to ``rotation R(q)`` (3, 3).
         """
+        self._offset_m, self._turn = offset_m, rotation
+
+    @property
+    def model_tip(self) -> TipState:
+        """Tip of the commanded lengths by the model alone, without the correction."""
+        return self._model_tip
+
+    def tip(self) -> TipState:
+        """Tip of the commanded lengths with the correction, in the base frame."""
+        model = self._model_tip
+        return TipState(
+            model.position_m + self._offset_m, self._turn @ model.rotation, model.jacobian
+        )
+
+    def step(self, dt_s: float) -> TipState:
+        """Move the commanded lengths by one tick; return the tip they stand for, corrected."""
         if self._task is None:
-            return self._tip
-        step = self._law.step(self._task, self._tip, self.lengths_m, dt_s)
+            return self.tip()
+        step = self._law.step(self._task, self.tip(), self.lengths_m, dt_s)
         self.fallbacks += step.fell_back
         moved = max(map(abs, (step.lengths_m - self.lengths_m).reshape(-1).tolist()))
         self.lengths_m = step.lengths_m
-        self._tip = self._kinematics.evaluate(self.lengths_m)
-        self._judge(self._tip, moved, dt_s)
-        return self._tip
+        self._model_tip = self._kinematics.evaluate(self.lengths_m)
+        tip = self.tip()
+        self._judge(tip, moved, dt_s)
+        return tip
 
     def pressures_pa(self) -> Array:
         """Gauge pressures (n_sections, 3) of the commanded lengths, inside their limits.

@@ -27,10 +27,11 @@ class TargetKind(IntEnum):
 
 @dataclass(frozen=True)
 class PositionTarget:
-    """Tip at ``position_m`` (3,)."""
+    """Tip at ``position_m`` (3,), a point that moves with ``velocity_m_s`` (3,) if one is given."""
 
     position_m: Array
     law: LawName = LawName.DEFAULT
+    velocity_m_s: Array | None = None
 
 
 @dataclass(frozen=True)
