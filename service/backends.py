@@ -10,7 +10,8 @@ def build(configuration: Configuration, arm: Arm) -> Hardware:
     from hardware.simulator.adapter import SimulatedArm
     from hardware.simulator.parameters import SimulatorParameters
 
-    return SimulatedArm(arm, SimulatorParameters(), configuration.simulator.seed)
+    simulated = configuration.build_simulated_arm()
+    return SimulatedArm(simulated, SimulatorParameters(), configuration.simulator.seed)
 
 
 def drawn_parameters(configuration: Configuration, arm: Arm) -> dict[str, float]:
