@@ -6,6 +6,7 @@ import numpy as np
 
 from controllers.actuation import PressureMap, pressure_length_bounds_m
 from controllers.arm import LENGTH_MARGIN_M, Arm, Array
+from controllers.errors import InvalidInput
 from controllers.kinematics.compiled import CompiledKinematics, TipState
 from controllers.law import AT_BOUND_M, Law, Limits
 from controllers.qp_ik import QpIk
@@ -17,6 +18,7 @@ from controllers.targets import (
     PoseTarget,
     PositionTarget,
     PressuresTarget,
+    ShapeTarget,
     Target,
     TwistTarget,
 )
@@ -74,6 +76,7 @@ class Controller:
         self._law = self._laws[settings.default_law]
         self.law_name = settings.default_law
         self._near_s = self._stalled_s = 0.0
+        self._moving = False
 
     def warm_up(self) -> None:
         """Run every law once at the rest lengths, so that no tick pays for a first use."""
@@ -88,8 +91,12 @@ class Controller:
         self._model_tip = self._kinematics.evaluate(self.lengths_m)
         self.set_target(None)
 
-    def set_target(self, target: Target | None) -> None:
-        """Follow a new target from where the command stands now; None holds."""
+    def set_target(self, target: Target | None, moving: bool = False) -> None:
+        """Follow a new target from where the command stands now; None holds.
+
+        A target that is only on the way, ``moving``, is never reached.
+        """
+        self._moving = moving
         self._task = None if target is None else self._task_of(target)
         if target is None:
             self.reach, self.error_m = Reach.NONE, 0.0
@@ -125,6 +132,8 @@ class Controller:
             case PressuresTarget():
                 lengths = self._pressure_map.lengths_m(target.pressures_pa)
                 return ChamberLengths(self._limits.length.clip(lengths), gain)
+            case ShapeTarget():
+                raise InvalidInput("a shape comes to the law as the positions along it")
 
     def set_correction(self, offset_m: Array, rotation: Array) -> None:
         """Say by how much the tip is elsewhere than the model has it, from now on.
@@ -177,7 +186,7 @@ class Controller:
         near = self.error_m <= self.settings.reached_tolerance_m
         still = moved_m < self.settings.stalled_rate_m_s * dt_s
         # The air follows the command with a lag: reached is what has been there for a while.
-        self._near_s = self._near_s + dt_s if near else 0.0
+        self._near_s = self._near_s + dt_s if near and not self._moving else 0.0
         self._stalled_s = self._stalled_s + dt_s if still and not near else 0.0
         if self._near_s >= self.settings.settled_time_s:
             self.reach = Reach.REACHED

@@ -64,11 +64,16 @@ class Reference:
         self.error = ""
         self.start([0.0] * self.size)
 
-    def start(self, position: list[float], velocity: list[float] | None = None) -> None:
-        """Be at a position, moving or not, with nowhere to go yet."""
+    def start(
+        self,
+        position: list[float],
+        velocity: list[float] | None = None,
+        acceleration: list[float] | None = None,
+    ) -> None:
+        """Be at a position, moving or not, with nowhere to go yet but to rest there."""
         zeros = [0.0] * self.size
-        moving = zeros if velocity is None else _clipped(velocity, self._speed)
-        self.now = Motion(position, moving, zeros)
+        moving = _clipped(velocity or zeros, self._speed)
+        self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration))
         self._goal = standing(position)
         self._plan: Trajectory | None = None
         self._since_s = 0.0
@@ -121,9 +126,7 @@ class Reference:
 
 
 def _clipped(values: list[float], limits: list[float]) -> list[float]:
-    return [
-        min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)
-    ]
+    return [min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)]
 
 
 def standing(position: list[float]) -> Goal:
