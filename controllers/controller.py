@@ -7,6 +7,7 @@ import numpy as np
 from controllers.actuation import PressureMap, pressure_length_bounds_m
 from controllers.arm import LENGTH_MARGIN_M, Arm, Array
 from controllers.errors import InvalidInput
+from controllers.inverse_play import InversePlay
 from controllers.kinematics.compiled import CompiledKinematics, TipState
 from controllers.law import AT_BOUND_M, Law, Limits
 from controllers.qp_ik import QpIk
@@ -52,12 +53,14 @@ class Controller:
 
     def __init__(self, arm: Arm, settings: ControlSettings) -> None:
         self.settings = settings
-        self.lengths_m = arm.rest_lengths_m.copy()
+        self._pressure_map = PressureMap(arm)
+        self._inverse_play = InversePlay(arm)
+        #: Of the vented arm as it hangs, until it is started from something.
+        self.lengths_m = self._pressure_map.lengths_m(np.zeros((arm.n_sections, 3)))
         self.fallbacks = 0
         self.reach = Reach.NONE
         self.error_m = 0.0
         self._limits = Limits(arm)
-        self._pressure_map = PressureMap(arm)
         self._kinematics = CompiledKinematics(arm)
         self._offset_m, self._turn = np.zeros(3), np.eye(3)
         self._model_tip = self._kinematics.evaluate(self.lengths_m)
@@ -73,6 +76,7 @@ class Controller:
         self._pressure_low = arm.per_chamber("pressure_min_pa")
         self._pressure_high = arm.per_chamber("pressure_max_pa")
         self._task: Task | None = None
+        self._sends_pressures = False
         self._law = self._laws[settings.default_law]
         self.law_name = settings.default_law
         self._near_s = self._stalled_s = 0.0
@@ -87,6 +91,8 @@ class Controller:
 
     def start_from(self, pressures_pa: Array) -> None:
         """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
+        if not self._inverse_play.none:
+            pressures_pa = self._inverse_play.start_from(pressures_pa)
         self.lengths_m = self._limits.clip(self._pressure_map.lengths_m(pressures_pa))
         self._model_tip = self._kinematics.evaluate(self.lengths_m)
         self.set_target(None)
@@ -102,6 +108,7 @@ class Controller:
             self.reach, self.error_m = Reach.NONE, 0.0
             self._near_s = self._stalled_s = 0.0
             return
+        self._sends_pressures = isinstance(target, PressuresTarget)
         self.law_name = self._law_name(target)
         self._law = self._laws[self.law_name]
 
@@ -173,6 +180,8 @@ class Controller:
         The way through lengths and back rounds, and a bound must not be exceeded by one bit.
         """
         pressures = self._pressure_map.pressures_pa(self.lengths_m)
+        if not self._inverse_play.none:
+            pressures = self._inverse_play.sent_pa(pressures, self._sends_pressures)
         return np.minimum(np.maximum(pressures, self._pressure_low), self._pressure_high)
 
     def _judge(self, tip: TipState, moved_m: float, dt_s: float) -> None:
