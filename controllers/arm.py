@@ -116,6 +116,7 @@ class Arm:
     ``gravity_m_s2`` is the acceleration of gravity in the base frame (z from base to tip of the
     straight arm): ``(0, 0, 9.81)`` is an arm that hangs. ``mass_kg`` is the mass of all sections,
     spread evenly over their rest lengths; it acts only where a section has a compliance.
+    ``tool_m`` is the point in the tip frame that counts as the tip everywhere.
     """
 
     name: str
@@ -123,6 +124,7 @@ class Arm:
     gravity_m_s2: tuple[float, float, float] = (0.0, 0.0, 9.81)
     mass_kg: float = 1.0
     response: Response = Response()
+    tool_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Raise InvalidInput for an arm without sections."""

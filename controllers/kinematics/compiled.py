@@ -94,7 +94,7 @@ def symbolic_tip(arm: Any, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
     Walking from the tip to the base: a section turns what follows it and moves it by its lever.
     """
-    position, rotation, columns = ca.SX(3, 1), ca.SX.eye(3), ca.SX(6, 0)
+    position, rotation, columns = ca.SX(ca.DM(arm.tool_m)), ca.SX.eye(3), ca.SX(6, 0)
     for index in reversed(range(arm.n_sections)):
         shape = symbolic_shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
         step, turn, local = _section_with_jacobian(*shape)
