@@ -14,6 +14,7 @@ from hardware.esp32 import protocol
 from hardware.esp32.protocol import Feedback, Remark
 from hardware.interface import Measurement
 from hardware.serial_line import SerialLine
+from hardware.setpoints import SentSetpoints
 
 WHAT = "the ESP32 controller"
 
@@ -78,6 +79,7 @@ class Esp32:
         remedy = "check its power, its USB cable and [esp32] device"
         self._line = SerialLine(settings.device, settings.baud, WHAT, remedy)
         self._order = CallOrder(WHAT)
+        self._setpoints = SentSetpoints(_SAME_PA)
         self._open = False
 
     def connect(self) -> None:
@@ -102,6 +104,7 @@ class Esp32:
         """Start with nothing known, vented."""
         self._newest: Feedback | None = None
         self._sent: Array = np.zeros((1, protocol.CHAMBERS))
+        self._setpoints.begin(self._sent)
         self._heard_s = self._sent_s = -math.inf
         self._fresh = True
         self._remark = ""
@@ -140,7 +143,7 @@ class Esp32:
     def read(self, time_s: float) -> Measurement:
         """Return the newest feedback, waiting a few milliseconds for it at most.
 
-        Raises HardwareError after ``timeout_s`` without any.
+        Raises HardwareError after ``timeout_s`` without any, and for targets that were not sent.
         """
         self._order.check(time_s)
         for line in self._line.receive(READ_WAIT_S):
@@ -157,6 +160,8 @@ class Esp32:
         if isinstance(said, Feedback):
             self._newest, self._fresh = said, True
             self.imu_deg = said.imu_deg
+            if self._setpoints.are_foreign(self._channels.gather(said.targets_kpa) * protocol.KPA):
+                raise self._line.error(f"has targets of {said.targets_kpa} kPa, which nobody sent")
         elif isinstance(said, Remark):
             self._remark = said.text if said.is_error else ""
         return said is not None
@@ -202,6 +207,7 @@ class Esp32:
     def _send(self, pressures_pa: Array, time_s: float) -> None:
         self._line.send(protocol.set_pressures(self._channels.scatter(pressures_pa)))
         self._sent, self._sent_s = pressures_pa.copy(), time_s
+        self._setpoints.add(pressures_pa)
 
     def _shows(self, pressures_pa: Array) -> bool:
         """Whether the newest feedback has these targets."""
