@@ -15,6 +15,7 @@ from controllers.settings import ControlSettings
 from controllers.targets import KIND_OF, PoseTarget, PositionTarget, Target, TargetKind
 from controllers.tasks.tip_pose import quaternion_from_rotation
 from hardware.guard import Guard
+from hardware.guarded import GuardedDevice, GuardedHardware
 from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
@@ -27,6 +28,7 @@ from service.commands import (
     SetTarget,
     SetTipPose,
 )
+from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
 
@@ -61,14 +63,13 @@ class Loop:
         self,
         arm: Arm,
         settings: LoopSettings,
-        hardware: Hardware,
+        hardware: Hardware | LinkedDevice,
         emit: Callable[[pb.Event], None],
     ) -> None:
         self._settings = settings
-        self._hardware = hardware
+        self._hardware = _guarded(hardware, arm, settings.period_s)
         self._controller = Controller(arm, settings.control)
         self._estimator = Estimator(arm)
-        self._guard = Guard(arm, settings.period_s)
         self._keeper = ModeKeeper(settings.timeouts, self._stamped(emit))
         self._tick = new_tick(arm.n_sections)
         self._record = self._tick.reshape(1).view(np.uint8).data
@@ -113,7 +114,7 @@ class Loop:
         now_s += 1e-6
         self._fill(self._hardware.read(now_s), self._sent)
         self._controller.binding()
-        self._hardware.write(self._guard.check(self._sent, now_s, now_s).pressures_pa, now_s)
+        self._hardware.write(self._sent, now_s, now_s)
         self._hardware.vent(now_s)
 
     def start_at(self, now_ns: int) -> None:
@@ -242,12 +243,10 @@ class Loop:
         if self._keeper.mode in VENTED_MODES:
             self._hardware.vent(now_s)
             self._sent = np.zeros_like(self._sent)
-            self._guard.acknowledge(self._sent, now_s)
             self._tick["guard_intervention"] = 0
             return
-        guarded = self._guard.check(wanted, now_s, now_s)
-        self._sent = self._hardware.write(guarded.pressures_pa, now_s)
-        self._guard.acknowledge(self._sent, now_s)
+        guarded = self._hardware.write(wanted, now_s, now_s)
+        self._sent = guarded.pressures_pa
         self._interventions += bool(guarded.intervention)
         self._tick["guard_intervention"] = int(guarded.intervention)
 
@@ -265,7 +264,7 @@ class Loop:
         tick, controller = self._tick, self._controller
         tick["length_commanded_m"] = controller.lengths_m
         tick["pressure_commanded_pa"] = wanted
-        tick["pressure_sent_pa"] = self._sent
+        tick["pressure_sent_pa"] = self._hardware.sent_pa
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
         self._fill_estimate(measurement)
@@ -304,6 +303,13 @@ class Loop:
         tick["target_sequence"] = target.sequence
         tick["target_age_s"] = self._target_age_s()
         _fill_pose(tick, target.target)
+
+
+def _guarded(hardware: Hardware | LinkedDevice, arm: Arm, period_s: float) -> GuardedHardware:
+    """Put the guard right before the device; one in a process of its own has it there."""
+    if isinstance(hardware, LinkedDevice):
+        return hardware
+    return GuardedDevice(hardware, Guard(arm, period_s), arm.n_sections)
 
 
 def _fill_pose(tick: np.ndarray, target: Target) -> None:
