@@ -114,14 +114,12 @@ class EmulatedArm:
 
     def set_pressures_pa(self, pressures_pa: Array, time_s: float, why: str = "write") -> None:
         """Take gauge setpoints (n_sections, 3) that have arrived at ``time_s``."""
-        self.advance(time_s)
         self.setpoints_pa = np.array(pressures_pa, dtype=np.float64).reshape(self._shape)
         self._valve.command(self.setpoints_pa, time_s)
         self._note(time_s, why)
 
     def zero_all(self, time_s: float, why: str) -> None:
         """Set every output to zero, for the terminal's own watchdog or stop."""
-        self.advance(time_s)
         self.setpoints_pa = np.zeros(self._shape)
         self._valve.vent(time_s)
         self._note(time_s, why)

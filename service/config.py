@@ -20,6 +20,7 @@ from controllers.arm import Arm
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
+from service.tables.festo import FestoCpxConfig, FestoVtemConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
 from service.tables.table import Table
@@ -35,6 +36,8 @@ class Configuration(Table):
     control: ControlConfig = ControlConfig()
     hardware: HardwareConfig = HardwareConfig()
     simulator: SimulatorConfig = SimulatorConfig()
+    festo_cpx: FestoCpxConfig = FestoCpxConfig()
+    festo_vtem: FestoVtemConfig = FestoVtemConfig()
     zenoh: ZenohConfig = ZenohConfig()
     rerun: RerunConfig = RerunConfig()
     log: LogConfig = LogConfig()

@@ -17,6 +17,7 @@ from controllers.targets import KIND_OF, TargetKind
 from controllers.tasks.tip_pose import quaternion_from_rotation
 from controllers.trajectory import ReferenceLimits
 from hardware.guard import Guard
+from hardware.guarded import GuardedDevice, GuardedHardware
 from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
@@ -29,6 +30,7 @@ from service.commands import (
     SetTarget,
     SetTipPose,
 )
+from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
 from service.steering import Steering
@@ -66,14 +68,13 @@ class Loop:
         self,
         arm: Arm,
         settings: LoopSettings,
-        hardware: Hardware,
+        hardware: Hardware | LinkedDevice,
         emit: Callable[[pb.Event], None],
     ) -> None:
         self._settings = settings
-        self._hardware = hardware
+        self._hardware = _guarded(hardware, arm, settings.period_s)
         self._controller = Controller(arm, settings.control)
         self._estimator = Estimator(arm)
-        self._guard = Guard(arm, settings.period_s)
         self._keeper = ModeKeeper(settings.timeouts, self._stamped(emit))
         self._steering = Steering(
             arm,
@@ -127,7 +128,7 @@ class Loop:
         now_s += 1e-6
         self._fill(self._hardware.read(now_s), self._sent)
         self._controller.binding()
-        self._hardware.write(self._guard.check(self._sent, now_s, now_s).pressures_pa, now_s)
+        self._hardware.write(self._sent, now_s, now_s)
         self._hardware.vent(now_s)
 
     def start_at(self, now_ns: int) -> None:
@@ -261,12 +262,10 @@ class Loop:
         if self._keeper.mode in VENTED_MODES:
             self._hardware.vent(now_s)
             self._sent = np.zeros_like(self._sent)
-            self._guard.acknowledge(self._sent, now_s)
             self._tick["guard_intervention"] = 0
             return
-        guarded = self._guard.check(wanted, now_s, now_s)
-        self._sent = self._hardware.write(guarded.pressures_pa, now_s)
-        self._guard.acknowledge(self._sent, now_s)
+        guarded = self._hardware.write(wanted, now_s, now_s)
+        self._sent = guarded.pressures_pa
         self._interventions += bool(guarded.intervention)
         self._tick["guard_intervention"] = int(guarded.intervention)
 
@@ -284,7 +283,7 @@ class Loop:
         tick, controller = self._tick, self._controller
         tick["length_commanded_m"] = controller.lengths_m
         tick["pressure_commanded_pa"] = wanted
-        tick["pressure_sent_pa"] = self._sent
+        tick["pressure_sent_pa"] = self._hardware.sent_pa
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
         self._fill_estimate(measurement)
@@ -325,3 +324,10 @@ class Loop:
         tick["target_position_m"] = position
         if quaternion is not None:
             tick["target_orientation_xyzw"] = quaternion
+
+
+def _guarded(hardware: Hardware | LinkedDevice, arm: Arm, period_s: float) -> GuardedHardware:
+    """Put the guard right before the device; one in a process of its own has it there."""
+    if isinstance(hardware, LinkedDevice):
+        return hardware
+    return GuardedDevice(hardware, Guard(arm, period_s), arm.n_sections)

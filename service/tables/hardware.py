@@ -11,8 +11,10 @@ from service.tables.table import Table
 class HardwareConfig(Table):
     """The device that moves the air. ``device`` empty means one simulator an arm."""
 
-    adapter: Literal["simulator"] = "simulator"
+    adapter: Literal["simulator", "festo-cpx", "festo-vtem"] = "simulator"
     device: Annotated[str, Field(max_length=64, pattern=r"^[\x20-\x7e]*$")] = ""
+    exchange_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
+    accept_no_watchdog: bool = False
 
 
 class SimulatorConfig(Table):

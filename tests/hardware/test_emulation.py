@@ -17,6 +17,7 @@ SETPOINTS_PA = np.array([[4e4, 2e4, -3e4]])
 
 def settled(*faults: str, seconds: float = 2.0) -> EmulatedArm:
     arm = EmulatedArm(paper_arm(), 0)
+    arm.advance(0.0)
     arm.set_pressures_pa(SETPOINTS_PA, 0.0)
     arm.advance(1.0)
     for words in faults:
@@ -93,6 +94,7 @@ def test_the_record_holds_changes_and_samples(tmp_path: Path) -> None:
     arm = EmulatedArm(paper_arm(), 0, DeviceRecord(path))
     for number in range(100):
         arm.set_pressures_pa(SETPOINTS_PA, 0.01 * number)
+        arm.advance(0.01 * number)
     arm.zero_all(1.0, "watchdog")
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     changes = [line for line in lines if "setpoints_pa" in line]
