@@ -7,6 +7,7 @@ import numpy as np
 
 from controllers.arm import Arm, Array
 from controllers.errors import ConfigurationError, HardwareError
+from hardware.checked import checked_command
 
 
 @dataclass(frozen=True)
@@ -72,12 +73,8 @@ class StepCommand:
 
         Raises HardwareError for a wrong shape and for elements that are no numbers.
         """
-        if pressures_pa.shape != self._low.shape or not np.isfinite(pressures_pa).all():
-            raise HardwareError(
-                f"pressures_pa = {pressures_pa.tolist()} for {self._what}: finite numbers of "
-                f"shape {self._low.shape} are needed; nothing was sent"
-            )
-        steps = np.clip(np.rint(pressures_pa / self._step_pa), self._first, self._last)
+        taken_pa = checked_command(pressures_pa, self._low, self._high, self._what)
+        steps = np.clip(np.rint(taken_pa / self._step_pa), self._first, self._last)
         # Adding 0.0 makes a negative zero positive.
         sendable: Array = np.clip(steps * self._step_pa, self._low, self._high) + 0.0
         return sendable

@@ -118,6 +118,8 @@ def shown(line: bytes) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Return what the system says, without a second device name or numbers in front."""
+    """Return what the system says, without numbers in front and the device's name behind."""
     text = (isinstance(error, OSError) and error.strerror) or str(error) or type(error).__name__
-    return text.splitlines()[0].rpartition("] ")[2][:100]
+    if text.startswith("device reports readiness"):  # how pyserial says that the cable was pulled
+        return "disconnected"
+    return text.splitlines()[0].rpartition("] ")[2].partition(": '")[0][:100]

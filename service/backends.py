@@ -17,7 +17,8 @@ def _simulator(configuration: Configuration, arm: Arm) -> Hardware:
     from hardware.simulator.adapter import SimulatedArm
     from hardware.simulator.parameters import SimulatorParameters
 
-    return SimulatedArm(arm, SimulatorParameters(), configuration.simulator.seed)
+    simulated = configuration.build_simulated_arm()
+    return SimulatedArm(simulated, SimulatorParameters(), configuration.simulator.seed)
 
 
 def _festo_cpx(configuration: Configuration, arm: Arm) -> Hardware:

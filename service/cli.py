@@ -90,6 +90,18 @@ def _workspace(arguments: argparse.Namespace) -> int:
     return workspace(arguments)
 
 
+def _doctor(arguments: argparse.Namespace) -> int:
+    from service.doctor.command import doctor
+
+    return doctor(arguments)
+
+
+def _systemd(arguments: argparse.Namespace) -> int:
+    from service.systemd.unit import systemd
+
+    return systemd(arguments)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
@@ -102,6 +114,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_logs(commands)
     _add_validate(commands)
     _add_workspace(commands)
+    _add_machine(commands)
     return parser
 
 
@@ -221,6 +234,16 @@ def _add_workspace(commands: Subparsers) -> None:
     workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
     workspace.add_argument("--seed", type=int, default=0, help="seed of the random points")
     workspace.add_argument("--json", action="store_true", help="one JSON object instead of text")
+
+
+def _add_machine(commands: Subparsers) -> None:
+    doctor = _command(commands, "doctor", _doctor, "Is this PC ready, and what must be changed.")
+    doctor.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    systemd = _command(commands, "systemd", _systemd, "Print a unit file: the daemon as a service.")
+    systemd.add_argument("--user", help="who runs it (default: you)")
+    for parser in (doctor, systemd):
+        parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
+        parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

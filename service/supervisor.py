@@ -28,6 +28,7 @@ from service.facts import info_of
 from service.local_stop import lock
 from service.mode import ModeEvent
 from service.network import check_free, read_config
+from service.notify import ServiceManager
 from service.process import ENDING_SIGNALS, Shared
 from service.repairing import start_mending
 from service.usage import ProcessTable
@@ -69,6 +70,7 @@ class Supervisor:
         self._stop_asked: dict[int, socket.socket] = {}
         self._request_id = 1
         self._ending = False
+        self._service_manager = ServiceManager()
 
     @staticmethod
     def _check_ports(configuration: Configuration) -> None:
@@ -196,6 +198,7 @@ class Supervisor:
             head, now_s = self._ticks.head(), time.monotonic()
             if head != newest:
                 newest, seen_s = head, now_s
+                self._service_manager.alive(now_s)
             elif now_s - seen_s > HEARTBEAT_S or not self._children["control"].is_alive():
                 self._vent_without_control()
                 return 3
@@ -224,6 +227,7 @@ class Supervisor:
 
     def _vent_without_control(self) -> None:
         """Control is dead or stopped: kill it for good, then zero the device from here."""
+        self._service_manager.stopping()  # or its watchdog might cut this short
         self._children["control"].kill()
         cause = "the control process died, or made no tick for 100 ms"
         # A device inside of control is gone with it, and its pressures with that.
@@ -280,6 +284,7 @@ class Supervisor:
 
     def _end_children(self) -> None:
         """Control first, so that the arm is empty; the recorder last, so that it has all of it."""
+        self._service_manager.stopping()
         control = self._children.get("control")
         if control is not None:
             self._control_pipe.send(Shutdown())

@@ -13,6 +13,7 @@ from hardware.ctrl_p import protocol
 from hardware.ctrl_p.protocol import Echo, Kind, Mode, Telemetry
 from hardware.interface import Measurement
 from hardware.serial_line import SerialLine
+from hardware.setpoints import SentSetpoints
 
 WHAT = "the Ctrl-P controller"
 
@@ -75,6 +76,7 @@ class CtrlP:
         self._line = SerialLine(settings.device, settings.baud, WHAT, remedy)
         self._order = CallOrder(WHAT)
         self._unknown = np.full((arm.n_sections, 3), np.nan)
+        self._setpoints = SentSetpoints(0.6 * protocol.STEP_PA)
         self._open = False
 
     def connect(self) -> None:
@@ -125,6 +127,7 @@ class CtrlP:
         self._values = dict.fromkeys((Kind.SETPOINTS, Kind.MEASURED), self._unknown)
         self._supply_pa = math.nan
         self._sent = np.zeros_like(self._unknown)
+        self._setpoints.begin(self._sent)
         self._armed = self._reported_armed = self._tripped = False
         self._fresh = True
         self._heard_s = self._sent_s = self._asked_s = -math.inf
@@ -149,8 +152,8 @@ class CtrlP:
     def read(self, time_s: float) -> Measurement:
         """Return the newest telemetry, waiting a few milliseconds for it at most.
 
-        Raises HardwareError after ``timeout_s`` without any, and once its own over-pressure
-        protection has acted, until the next vent.
+        Raises HardwareError after ``timeout_s`` without any, for setpoints that were not sent, and
+        once its own over-pressure protection has acted, until the next vent.
         """
         self._order.check(time_s)
         for line in self._line.receive(READ_WAIT_S):
@@ -181,8 +184,11 @@ class CtrlP:
             return True
         if len(said.values_kpa) != self._settings.channels:
             return False
-        self._values[said.kind] = self._channels.gather(said.values_kpa) * protocol.KPA
+        values_pa = self._channels.gather(said.values_kpa) * protocol.KPA
+        self._values[said.kind] = values_pa
         self._fresh |= said.kind == Kind.MEASURED
+        if said.kind == Kind.SETPOINTS and self._setpoints.are_foreign(values_pa):
+            raise self._line.error(f"has setpoints of {said.values_kpa} kPa, which nobody sent")
         return True
 
     def _take_echo(self, echo: Echo) -> bool:
@@ -223,6 +229,7 @@ class CtrlP:
         if elapsed_s >= (WRITE_INTERVAL_S if changed else REPEAT_S) or not self._armed:
             self._line.send(protocol.setpoints(self._channels.scatter(wanted)))
             self._sent, self._sent_s = wanted, time_s
+            self._setpoints.add(wanted)
             self._regulate()
         return self._sent.copy()
 
@@ -238,6 +245,7 @@ class CtrlP:
         if self._armed or time_s - self._sent_s >= REPEAT_S:
             self._armed, self._sent_s = False, time_s
             self._sent = np.zeros_like(self._sent)
+            self._setpoints.add(self._sent)
             self._send_vent()
 
     def _send_vent(self) -> None:

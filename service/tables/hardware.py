@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from service.tables.arm import ArmConfig
 from service.tables.table import Table
 
 
@@ -17,6 +18,11 @@ class HardwareConfig(Table):
 
 
 class SimulatorConfig(Table):
-    """The simulated arm: every parameter is drawn from the seed."""
+    """The simulated arm: every parameter is drawn from the seed.
+
+    ``arm`` is the arm that is simulated where it is not the one that the controller believes in:
+    a calibration changes the second, not the first.
+    """
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    arm: ArmConfig | None = None

@@ -7,7 +7,7 @@ yields a :class:`Bench`.
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
 from hardware.ctrl_p.emulator import CtrlPEmulator
 from hardware.ctrl_p.protocol import STEP_PA as CTRL_P_STEP_PA
 from hardware.emulation import EmulatedArm
+from hardware.esp32.adapter import WRITE_INTERVAL_S as ESP32_WRITE_INTERVAL_S
+from hardware.esp32.adapter import Esp32, Esp32Settings
+from hardware.esp32.emulator import Esp32Emulator
+from hardware.esp32.protocol import STEP_PA as ESP32_STEP_PA
 from hardware.interface import Hardware
 from hardware.pseudo_terminal import PseudoTerminal
 from hardware.simulator.adapter import SimulatedArm
@@ -130,6 +134,23 @@ def ctrl_p(arm: Arm) -> Iterator[Bench]:
         yield serial_bench(arm, hardware, emulated, terminal, CTRL_P_STEP_PA)
 
 
+@contextmanager
+def esp32(arm: Arm) -> Iterator[Bench]:
+    """An ESP32 controller; the arm has the range of pressures that it can give."""
+    low_pressure = replace(
+        arm.sections[0], pressure_min_pa=0.0, pressure_max_pa=1.2e4, pressure_slew_max_pa_s=1e5
+    )
+    arm = replace(arm, sections=(low_pressure,))
+    valves, potentiometers = (2, 0, 1), ((3, 6), (1, 4), (2, 5))
+    emulated = EmulatedArm(arm, 0)
+    emulator = Esp32Emulator(emulated, Channels(arm, 3, valves, "valves"))
+    with PseudoTerminal(emulator) as terminal:
+        settings = Esp32Settings(str(terminal.path), valves, potentiometers, connect_timeout_s=1.0)
+        bench = serial_bench(arm, Esp32(arm, settings), emulated, terminal, ESP32_STEP_PA)
+        bench.period_s = ESP32_WRITE_INTERVAL_S
+        yield bench
+
+
 def serial_bench(
     arm: Arm,
     hardware: Hardware,
@@ -160,6 +181,7 @@ def serial_bench(
 DEVICES: dict[str, Factory] = {
     "simulator": simulator,
     "ctrl-p": ctrl_p,
+    "esp32": esp32,
 }
 
 #: How far ``told_pa`` may be from what was sent, in Pa: the simulator has real valves.
