@@ -6,7 +6,13 @@ import sys
 import time
 from pathlib import Path
 
-from tests.faults import client_faults, machine_faults, process_faults, wire_faults
+from tests.faults import (
+    client_faults,
+    device_faults,
+    machine_faults,
+    process_faults,
+    wire_faults,
+)
 from tests.faults.campaign import run_campaign, tell
 from tests.faults.fault import Fault
 from tests.faults.report import Report, write_page
@@ -17,6 +23,7 @@ FAULTS: tuple[Fault, ...] = (
     *client_faults.FAULTS,
     *wire_faults.FAULTS,
     *machine_faults.FAULTS,
+    *device_faults.FAULTS,
 )
 
 

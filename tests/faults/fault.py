@@ -20,7 +20,8 @@ class Injection:
     that tells of it; ``allowed`` are those in which the arm may be until ``until_ns``.
     ``held_after_s`` is the target's timeout where the arm has to hold for want of targets,
     ``logged_until_s`` how much of its end the log may lack, ``only_targets_of`` whose targets
-    alone may have been accepted.
+    alone may have been accepted. ``zero_within_s`` is the time in which the
+    device has to be zeroed, by its own record.
     """
 
     fault: str
@@ -37,6 +38,7 @@ class Injection:
     held_after_s: float | None = None
     logged_until_s: float | None = None
     only_targets_of: str = ""
+    zero_within_s: float | None = None
     kept: int = 0
     broken: list[str] = field(default_factory=list)
     figures: dict[str, float] = field(default_factory=dict)
