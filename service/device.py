@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from controllers.errors import HardwareError
 from hardware.guard import Guard
 from hardware.guarded import GuardedDevice
-from service import backends
+from service import backends, realtime
 from service.config import Configuration
 from service.device_link import DeviceCommand, DeviceEnd, DeviceLink, LinkState, Order
 from service.process import Shared, ignore_terminal_signals, parent_is_alive
@@ -160,5 +160,7 @@ def main(
 ) -> None:
     """Entry point of the process; the locks are held here too, as in control."""
     ignore_terminal_signals()
+    # Right below the loop: a command that waits for a processor gets old.
+    realtime.take_priority(max(1, shared.configuration.control.priority - 1))
     if shared.device is not None:
         DeviceProcess(shared.configuration, shared.device, end).run()
