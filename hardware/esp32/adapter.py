@@ -121,8 +121,8 @@ class Esp32:
         """Send zeros until the feedback shows them; raises HardwareError after ``wait_s``.
 
         The firmware forgets a command that comes right after another, and feedback from before the
-        zeros proves nothing: they are sent again every three passes, and only what is said two
-        passes after a repetition counts.
+        zeros proves nothing: they are sent again two passes later, when nothing else can be on its
+        way, and what is said two passes after that counts. Then the same again.
         """
         self._line.receive(0.0)
         passes = itertools.count(1)
@@ -133,9 +133,9 @@ class Esp32:
                 return None
             self._newest = feedback
             number = next(passes)
-            if number >= 5 and number % 3 == 2 and not any(feedback.targets_kpa):
+            if number % 4 == 0 and not any(feedback.targets_kpa):
                 return True
-            if number % 3 == 0:
+            if number % 4 == 2:
                 self._line.send(protocol.VENT)
             return None
 
@@ -221,11 +221,17 @@ class Esp32:
         return bool((np.abs(targets_pa - pressures_pa) <= _SAME_PA).all())
 
     def vent(self, time_s: float) -> None:
-        """Send zeros at once, and again while it is called until the feedback shows them."""
+        """Send zeros; after another command, wait four passes until the feedback shows them.
+
+        Raises HardwareError where it does not.
+        """
         time_s = self._order.at_any_time(time_s)
         zeros = np.zeros_like(self._sent)
-        overdue = time_s - self._sent_s >= REPEAT_S and not self._shows(zeros)
-        if self._sent.any() or overdue:
+        if self._sent.any():
+            self._sent, self._sent_s, self._heard_s = zeros, time_s, time_s
+            self._setpoints.add(zeros)
+            self._empty(self._settings.timeout_s)
+        elif time_s - self._sent_s >= REPEAT_S and not self._shows(zeros):
             self._send(zeros, time_s)
 
     def close(self) -> None:
