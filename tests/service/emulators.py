@@ -32,7 +32,9 @@ class Emulator:
             lines.append(line)
         self.tables: dict[str, dict[str, Any]] = tomllib.loads("".join(lines))
         self.tables.pop("preset")
-        # A test machine may be busier than any terminal.
+        # A test machine may be busier than any robot's.
+        self.tables["hardware"] |= {"exchange_rate_hz": 100.0}
+        self.tables["control"] = {"rate_hz": 250.0}
         self.tables[name.replace("-", "_")] |= {"timeout_ms": 150.0, "watchdog_ms": 500}
 
     def say(self, words: str) -> None:
