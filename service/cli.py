@@ -14,7 +14,7 @@ Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 PRESETS = ("paper", "table1", "trunk")
 
 #: Devices that `emulate` knows; the modules are in service/commands_emulate.py.
-EMULATED = ("festo-cpx", "festo-vtem")
+EMULATED = ("festo-cpx", "festo-vtem", "ctrl-p", "esp32")
 _ENDPOINT = "tcp/127.0.0.1:7447"
 
 
