@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from multiprocessing import get_context
 
-from controllers.errors import ConfigurationError, PneuarmError
+from controllers.errors import ConfigurationError
 from logs.ring import RingReader
 from logs.rings import MessageReader, MessageWriter, Rings
 from logs.schema import pneuarm_pb2 as pb
@@ -23,6 +23,8 @@ from service.announce import Announcer, start_facts
 from service.children import Child
 from service.commands import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from service.config import Configuration, log_directory
+from service.device_keeper import DeviceKeeper
+from service.device_link import DeviceLink
 from service.facts import info_of
 from service.local_stop import lock
 from service.mode import ModeEvent
@@ -53,7 +55,8 @@ class Supervisor:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
         self._say = say
         self._arm_lock = lock("arm", configuration.arm.name)
-        self._device_lock = lock("device", configuration.device_address)
+        backends.check(configuration)
+        self._device_lock = lock("device", backends.address(configuration))
         self._check_ports(configuration)
         self._directory = log_directory(configuration)
         self._make_directory()
@@ -67,6 +70,7 @@ class Supervisor:
         self._requests = new_pipe()
         self._stream = new_pipe()
         self._children: dict[str, Child] = {}
+        self._device = self._keep_device(configuration)
         self._stop_asked: dict[int, socket.socket] = {}
         self._request_id = 1
         self._ending = False
@@ -106,6 +110,9 @@ class Supervisor:
             recorder=RecorderStatus.create(self._context),
             viewer=ViewerStatus.create(self._context),
             processes=ProcessTable.create(self._context),
+            device=None
+            if backends.in_control(configuration)
+            else DeviceLink.create(self._context, arm.n_sections),
         )
         shared.processes.started("supervisor", os.getpid())
         return shared
@@ -118,6 +125,15 @@ class Supervisor:
             candidate = f"{name}-{number}"
         return candidate
 
+    def _keep_device(self, configuration: Configuration) -> DeviceKeeper | None:
+        """Prepare the device process, where the device has one."""
+        if self._shared.device is None:
+            return None
+        arguments = (self._shared, self._arm_lock, self._device_lock)
+        child = Child("device", self._context, arguments, self._shared.processes)
+        self._children["device"] = child
+        return DeviceKeeper(configuration, self._shared.device, child)
+
     # --- running ---------------------------------------------------------------------------
 
     def run(self) -> int:
@@ -126,6 +142,8 @@ class Supervisor:
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` sets it
                 signal.signal(number, self._on_signal)
         try:
+            if self._device is not None:
+                self._device.start(lambda: self._ending)
             self._start_control()
             for line in start_facts(self._shared, self._realtime_fact()):
                 self._say(line)
@@ -180,6 +198,7 @@ class Supervisor:
         while not self._ending:
             self._serve_local_stop(_PERIOD_S)
             self._announcer.step()
+            self._look_after_device()
             self._revive()
             head, now_s = self._ticks.head(), time.monotonic()
             if head != newest:
@@ -190,8 +209,18 @@ class Supervisor:
                 return 3
         return 0
 
+    def _look_after_device(self) -> None:
+        """A dead or stuck device process: zero the device from here, until it is there again."""
+        if self._device is not None and (failed := self._device.look_after()):
+            self._tell(
+                pb.ERROR,
+                "vent_failed",
+                f"the device process is lost and the device could not be vented: {failed}",
+                remedy="cut the air supply; the device's own watchdog zeroes it where it has one",
+            )
+
     def _revive(self) -> None:
-        """Start dead gateway, recorder and viewer again; the arm goes on, or holds by itself."""
+        """Start dead processes but control again; the arm goes on, holds, or is in fault."""
         for name, child in self._children.items():
             if name != "control" and child.revive_if_due():
                 self._tell(
@@ -206,17 +235,12 @@ class Supervisor:
         self._service_manager.stopping()  # or its watchdog might cut this short
         self._children["control"].kill()
         cause = "the control process died, or made no tick for 100 ms"
-        try:
-            configuration = self._shared.configuration
-            device = backends.build(configuration, configuration.build_arm())
-            device.connect()
-            device.vent(time.monotonic_ns() * 1e-9)
-            device.close()
-        except PneuarmError as error:
+        # A device inside of control is gone with it, and its pressures with that.
+        if self._device is not None and (failed := self._device.zero()):
             self._tell(
                 pb.ERROR,
                 "vent_failed",
-                f"control is lost and the device could not be vented: {error}",
+                f"control is lost and the device could not be vented: {failed}",
                 cause,
                 "cut the air supply; the device's own watchdog zeroes it where it has one",
             )
@@ -275,7 +299,7 @@ class Supervisor:
             control.end_if_loading()
             if not control.join(_END_S):
                 self._vent_without_control()
-        for name in ("gateway", "recorder", "viewer"):
+        for name in ("device", "gateway", "recorder", "viewer"):
             child = self._children.get(name)
             if child is not None and name != "recorder":  # which has something to write
                 child.end_if_loading()
@@ -285,7 +309,7 @@ class Supervisor:
 
     @staticmethod
     def _patience_s(name: str) -> float:
-        return 30.0 if name == "recorder" else 2.0
+        return {"recorder": 30.0, "device": 6.0}.get(name, 2.0)
 
     def _tell(
         self, level: "pb.Level", code: str, text: str, cause: str = "", remedy: str = ""

@@ -70,8 +70,15 @@ def configuration_of(preset: str = "paper", rate_hz: float = 500.0, seed: int = 
 class Bench:
     """One arm and its loop; `tick` is one period. The gateway's heartbeat comes by itself."""
 
-    def __init__(self, preset: str = "paper", rate_hz: float = 500.0, seed: int = 0) -> None:
-        self.configuration = configuration_of(preset, rate_hz, seed)
+    def __init__(
+        self,
+        preset: str = "paper",
+        rate_hz: float = 500.0,
+        seed: int = 0,
+        configuration: Configuration | None = None,
+    ) -> None:
+        self.configuration = configuration or configuration_of(preset, rate_hz, seed)
+        rate_hz = self.configuration.control.rate_hz
         self.arm = self.configuration.build_arm()
         self.hardware = Watched(backends.build(self.configuration, self.arm))
         self.events: list[pb.Event] = []
