@@ -64,7 +64,9 @@ class _Problem:
         self._span_pa = np.array([[span_pa(section)] for section in arm.sections])
         self.start = start_of(arm)
         self._shape = self.start.shape
-        pose = self.model.poses(recording.sent_pa[rests.last], self.start)
+        width = self.start[:, 13:] * self._span_pa
+        acting, _ = play_outputs(recording.sent_pa, width)
+        pose = self.model.poses(acting[rests.last], self.start)
         self.frames = aligned(pose[:, :3], rests.tip_m) if in_world else in_base()
         self.before_m = self.frames.measured_m(pose)
         self._free = self._free_parameters(in_world)
@@ -83,8 +85,7 @@ class _Problem:
         if np.linalg.norm(self.arm.gravity_m_s2) == 0.0:
             free[:, 4:6] = False
         if in_world:
-            free[0, 12] = False  # the turn about the backbone is the base's
-            free[:, 12] = False
+            free[:, 12] = False  # the turn about the backbone is the base's
         return free.reshape(-1)
 
     def theta(self, x: Array) -> Array:

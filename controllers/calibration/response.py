@@ -2,7 +2,7 @@
 
 Two fits. The pressures measured are the pressures sent, through a play, a dead time and a lag of
 first order. The tip after a step is where the map says, through an oscillator of second order; the
-map's own error is taken out by an offset and a gain for every step and direction.
+map's own error is taken out by an offset and a gain for every step.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,11 +13,12 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from controllers.arm import Arm, Array, Response
+from controllers.calibration.frames import Frames
 from controllers.calibration.hysteresis import play_outputs
 from controllers.calibration.model import TipModel
 from controllers.calibration.parameters import start_of
 from controllers.calibration.recording import STILL_PA_S, Recording
-from controllers.errors import InvalidInput
+from controllers.errors import CalibrationError
 
 #: The fits run on this grid (s).
 STEP_S = 0.005
@@ -31,7 +32,7 @@ _MOVED_M = 0.01
 
 @dataclass(frozen=True)
 class StepAnswer:
-    """One step: time from its beginning (s), the tip measured and modelled along one axis, m."""
+    """One step: time from its beginning (s), the tip measured and modelled along its way, m."""
 
     time_s: Array
     measured_m: Array
@@ -47,10 +48,10 @@ class ResponseFit:
     steps: tuple[StepAnswer, ...]
 
 
-def fit_response(arm: Arm, recording: Recording) -> ResponseFit:
-    """Fit the response of ``arm``, whose map is fitted already.
+def fit_response(arm: Arm, recording: Recording, frames: Frames) -> ResponseFit:
+    """Fit the response of ``arm``, whose map and ``frames`` of measurement are fitted already.
 
-    Raises InvalidInput for a recording without a step.
+    Raises CalibrationError for a recording without a step.
     """
     grid = _Grid(recording)
     (delay_s, lag_s, _), valve_sd = _fit_valves(grid, arm.response)
@@ -59,10 +60,10 @@ def fit_response(arm: Arm, recording: Recording) -> ResponseFit:
         _lagged(grid.sent_pa, delay_s, lag_s), arm.per_section("hysteresis_pa")
     )
     model, start = TipModel(arm), start_of(arm)
-    static_m = [model.poses(acting[window], start)[:, :3] for window in windows]
+    static_m = [frames.measured_m(model.poses(acting[window], start)) for window in windows]
     mode, mode_sd, steps = _fit_mode(grid, windows, static_m, arm.response)
     if not steps:
-        raise InvalidInput(_NO_STEP)
+        raise CalibrationError(_NO_STEP)
     return ResponseFit(
         _response(delay_s, lag_s, *mode),
         _response(valve_sd[0], valve_sd[1], *mode_sd),
@@ -130,7 +131,7 @@ def _fit_valves(grid: _Grid, nominal: Response) -> tuple[Array, Array]:
     """Dead time (s), lag (s) and half width of the valves' play (Pa), and their deviations."""
     finite = np.isfinite(grid.measured_pa).reshape(len(grid.time_s), -1).all(axis=1)
     if not finite.all():
-        raise InvalidInput(
+        raise CalibrationError(
             "the device measured no pressures: without them the lag of the valves is not seen"
         )
 
@@ -160,20 +161,18 @@ def _fit_mode(
 ) -> tuple[Array, Array, tuple[StepAnswer, ...]]:
     """Frequency (Hz) and damping ratio of the lowest mode, their deviations, and the steps."""
     moved = [
-        (window, axis, static[:, axis])
+        (static @ direction, grid.tip_m[window] @ direction)
         for window, static in zip(windows, static_m, strict=True)
-        for axis in (0, 1)
-        if np.ptp(static[:, axis]) > _MOVED_M
+        if np.ptp(static @ (direction := _direction(static))) > _MOVED_M
     ]
 
     def answers(x: Array) -> list[StepAnswer]:
         found = []
-        for window, axis, static in moved:
+        for static, measured in moved:
             modelled = _swinging(static, x[0], x[1])
-            measured = grid.tip_m[window, axis]
             columns = np.column_stack([modelled, np.ones_like(modelled)])
             gain, offset = np.linalg.lstsq(columns, measured, rcond=None)[0]
-            time_s = grid.time_s[window] - grid.time_s[window][0]
+            time_s = STEP_S * np.arange(len(measured))
             found.append(StepAnswer(time_s, measured, gain * modelled + offset))
         return found
 
@@ -189,6 +188,12 @@ def _fit_mode(
     ]
     x, sd = min(tries, key=lambda each: float(np.sum(rows(each[0]) ** 2)))
     return x, sd, tuple(answers(x))
+
+
+def _direction(static_m: Array) -> Array:
+    """Direction (3,) in which a step moves the tip most."""
+    direction: Array = np.linalg.svd(static_m - static_m.mean(axis=0), full_matrices=False)[2][0]
+    return direction
 
 
 def _swinging(static: Array, mode_hz: float, damping_ratio: float) -> Array:
