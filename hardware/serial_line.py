@@ -87,6 +87,18 @@ class SerialLine:
             self._rest = b""
         return [line.strip(b"\r") for line in lines]
 
+    def take_until(self, take: Callable[[bytes], bool], wait_s: float) -> None:
+        """Hand every line to ``take`` until it has said True of one, or ``wait_s`` is over.
+
+        What has come already is taken first, all of it. Lines that are empty mean nothing.
+        """
+        give_up_s = time.monotonic() + wait_s
+        left_s, found = 0.0, False
+        while not found and left_s >= 0.0:
+            for line in filter(None, self.receive(left_s)):
+                found |= take(line)
+            left_s = give_up_s - time.monotonic()
+
     def wait_for(self, find: Callable[[bytes], T | None], timeout_s: float, what: str) -> T:
         """Return the first thing that ``find`` makes of a line; raises HardwareError without."""
         give_up_s = time.monotonic() + timeout_s

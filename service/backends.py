@@ -1,5 +1,6 @@
 """Adapter's name -> device, loaded only when it is asked for."""
 
+import os
 import socket
 from collections.abc import Callable
 from contextlib import suppress
@@ -33,10 +34,31 @@ def _festo_vtem(configuration: Configuration, arm: Arm) -> Hardware:
     return vtem(configuration, arm)
 
 
+def _ctrl_p(configuration: Configuration, arm: Arm) -> Hardware:
+    from service.serial_devices import ctrl_p
+
+    return ctrl_p(configuration, arm)
+
+
+def _esp32(configuration: Configuration, arm: Arm) -> Hardware:
+    from service.serial_devices import esp32
+
+    return esp32(configuration, arm)
+
+
+def _replay(configuration: Configuration, arm: Arm) -> Hardware:
+    from service.serial_devices import replay
+
+    return replay(configuration, arm)
+
+
 _BUILDERS: dict[str, Callable[[Configuration, Arm], Hardware]] = {
     "simulator": _simulator,
     "festo-cpx": _festo_cpx,
     "festo-vtem": _festo_vtem,
+    "ctrl-p": _ctrl_p,
+    "esp32": _esp32,
+    "replay": _replay,
 }
 
 
@@ -89,6 +111,9 @@ def address(configuration: Configuration) -> str:
         with suppress(OSError, UnicodeError):
             host = socket.gethostbyname(host)
         return f"tcp/{host}:{terminal.port}"
+    ports = {"ctrl-p": configuration.ctrl_p.device, "esp32": configuration.esp32.device}
+    if adapter in ports:  # by whatever link it is called
+        return f"serial:{os.path.realpath(ports[adapter])}"
     return configuration.device_address
 
 

@@ -1,6 +1,7 @@
 """A child process of the daemon: started with spawn, ended by a word, revived if it may be."""
 
 import importlib
+import os
 import signal
 import sys
 import time
@@ -30,7 +31,7 @@ def enter(name: str, arguments: tuple[object, ...]) -> None:
         main(*arguments)
     except PneuarmError as error:
         print(f"ERROR      {name}: {error}", file=sys.stderr, flush=True)
-        raise SystemExit(1) from error
+        os._exit(1)  # a library's threads might keep the process from ending
 
 
 class Child:
@@ -81,6 +82,11 @@ class Child:
         self._restarts += 1
         self.start()
         return True
+
+    def end_if_loading(self) -> None:
+        """End it at once if it still loads its modules; after that it ignores this signal."""
+        if self._process is not None:
+            self._process.terminate()
 
     def end(self, patience_s: float) -> bool:
         """Ask it to end; kill it after the given time. Return whether it ended by itself."""

@@ -14,7 +14,7 @@ Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 PRESETS = ("paper", "table1", "trunk")
 
 #: Devices that `emulate` knows; the modules are in service/commands_emulate.py.
-EMULATED = ("festo-cpx", "festo-vtem")
+EMULATED = ("festo-cpx", "festo-vtem", "ctrl-p", "esp32")
 _ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -102,6 +102,12 @@ def _systemd(arguments: argparse.Namespace) -> int:
     return systemd(arguments)
 
 
+def _calibrate(arguments: argparse.Namespace) -> int:
+    from service.commands_calibrate import run
+
+    return run(arguments)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
@@ -115,6 +121,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_validate(commands)
     _add_workspace(commands)
     _add_machine(commands)
+    _add_calibrate(commands)
     return parser
 
 
@@ -244,6 +251,20 @@ def _add_machine(commands: Subparsers) -> None:
     for parser in (doctor, systemd):
         parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
         parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
+
+
+def _add_calibrate(commands: Subparsers) -> None:
+    help_text = "Move the arm, fit the map between pressure and length, write a configuration."
+    calibrate = _command(commands, "calibrate", _calibrate, help_text)
+    _add_connection(calibrate)
+    calibrate.set_defaults(arm=None)  # a log says by itself whose it is
+    calibrate.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="(default: .)")
+    calibrate.add_argument(
+        "--from", dest="from_logs", nargs="+", type=Path, metavar="LOG", help="recorded sessions"
+    )
+    calibrate.add_argument(
+        "--world", action="store_true", help="poses are of a marker, in a frame not the base's"
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,6 +5,7 @@ import contextlib
 import queue
 import threading
 
+from service import backends
 from service.config import load, rerun_url
 
 
@@ -54,6 +55,7 @@ def config(arguments: argparse.Namespace) -> int:
     if arguments.action == "show":
         print(configuration.to_toml(), end="")
     else:
+        backends.check(configuration)
         sections = len(configuration.arm.sections)
         where = arguments.config or f"preset {configuration.preset}"
         print(

@@ -12,6 +12,8 @@ from service.config import PRESETS, Configuration, load
 EMULATORS = {
     "festo-cpx": "service.emulate_festo:cpx",
     "festo-vtem": "service.emulate_festo:vtem",
+    "ctrl-p": "service.emulate_serial:ctrl_p",
+    "esp32": "service.emulate_serial:esp32",
 }
 
 Emulator = Callable[[argparse.Namespace, Configuration], int]

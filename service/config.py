@@ -23,6 +23,7 @@ from service.tables.control import ControlConfig
 from service.tables.festo import FestoCpxConfig, FestoVtemConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
+from service.tables.serial import CtrlPConfig, Esp32Config, ReplayConfig
 from service.tables.table import Table
 
 PRESETS = ("paper", "table1", "trunk")
@@ -38,6 +39,9 @@ class Configuration(Table):
     simulator: SimulatorConfig = SimulatorConfig()
     festo_cpx: FestoCpxConfig = FestoCpxConfig()
     festo_vtem: FestoVtemConfig = FestoVtemConfig()
+    ctrl_p: CtrlPConfig = CtrlPConfig()
+    esp32: Esp32Config = Esp32Config()
+    replay: ReplayConfig = ReplayConfig()
     zenoh: ZenohConfig = ZenohConfig()
     rerun: RerunConfig = RerunConfig()
     log: LogConfig = LogConfig()

@@ -11,8 +11,9 @@ from multiprocessing.connection import Connection
 from controllers.errors import HardwareError
 from hardware.guard import Guard
 from hardware.guarded import GuardedDevice
-from service import backends
-from service.device_link import DeviceCommand, DeviceEnd, LinkState, Order
+from service import backends, realtime
+from service.config import Configuration
+from service.device_link import DeviceCommand, DeviceEnd, DeviceLink, LinkState, Order
 from service.process import Shared, ignore_terminal_signals, parent_is_alive
 
 #: Control's first commands, while it warms up, come in no order of time: until this many have come
@@ -27,15 +28,12 @@ _VENT_BEFORE_END_S = 3.0
 class DeviceProcess:
     """Serves one device until the order to end, or until its parent is gone."""
 
-    def __init__(self, shared: Shared, end: Connection) -> None:
-        configuration = shared.configuration
+    def __init__(self, configuration: Configuration, link: DeviceLink, end: Connection) -> None:
         arm = configuration.build_arm()
         period_s = 1.0 / configuration.control.rate_hz
-        if shared.device is None:
-            raise HardwareError("this adapter runs inside of control, not as a process")
         guard = Guard(arm, period_s)
         self._device = GuardedDevice(backends.build(configuration, arm), guard, arm.n_sections)
-        self._link = DeviceEnd(shared.device)
+        self._link = DeviceEnd(link)
         self._max_age_s = max(Guard.MAX_AGE_PERIODS * period_s, Guard.MAX_AGE_S)
         self._period_s = 1.0 / min(
             configuration.hardware.exchange_rate_hz, configuration.control.rate_hz
@@ -162,4 +160,7 @@ def main(
 ) -> None:
     """Entry point of the process; the locks are held here too, as in control."""
     ignore_terminal_signals()
-    DeviceProcess(shared, end).run()
+    # Right below the loop: a command that waits for a processor gets old.
+    realtime.take_priority(max(1, shared.configuration.control.priority - 1))
+    if shared.device is not None:
+        DeviceProcess(shared.configuration, shared.device, end).run()

@@ -13,7 +13,7 @@ from hardware.festo_vtem.emulator import EmulatedVtem
 from hardware.modbus_server import EmulatedTerminal, ModbusServer
 from hardware.terminal_watchdog import TerminalWatchdog
 from hardware.transport_faults import ALL_WORDS, TransportFaults, start_console
-from service import festo
+from service import festo, realtime
 from service.config import Configuration
 from service.tables.festo import FestoConfig
 
@@ -62,6 +62,7 @@ def _serve(
     terminal: EmulatedTerminal,
     arm: EmulatedArm,
 ) -> int:
+    realtime.take_priority(1)  # a real terminal is not kept waiting by what this machine does
     faults = TransportFaults()
     with asyncio.Runner() as runner:
         try:

@@ -34,7 +34,7 @@ from service.inbox import Inbox
 from service.lease import Lease
 from service.mode import Mode, ModeEvent
 from service.notes import Notes
-from service.process import Shared, ignore_terminal_signals, parent_is_alive
+from service.process import Shared, end_with_parent, ignore_terminal_signals, parent_is_alive
 from service.publisher import Publisher
 
 _PERIOD_S = 0.01
@@ -42,6 +42,9 @@ _HEARTBEAT_S = 0.05
 
 #: A stop without control's answer for so long is repeated; control answers in its next tick.
 _REPEAT_STOP_S = 0.02
+
+#: Without a supervisor: time for the last states, and for Zenoh to close.
+_ORPHAN_S = 3.0
 
 _EVENTS = {
     pb.ENABLE: ModeEvent.ENABLE,
@@ -241,6 +244,7 @@ class Gateway:
 def main(shared: Shared, requests: Pipe, stream: Pipe, end: Connection) -> None:
     """Entry point of the process; ends when told through ``end``, or when its parent is gone."""
     ignore_terminal_signals()
+    end_with_parent(_ORPHAN_S)
     zenoh_config = shared.configuration.zenoh
     session = network.open_listening(zenoh_config.listen, zenoh_config.config_file)
     try:

@@ -1,6 +1,9 @@
 """What every child process of the daemon does first, and what is handed to it."""
 
+import os
 import signal
+import threading
+import time
 from dataclasses import dataclass
 from multiprocessing import parent_process
 
@@ -48,6 +51,23 @@ def ignore_terminal_signals() -> None:
     """Leave the signals that end us to the supervisor, which ends the processes in their order."""
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
+
+
+def end_with_parent(patience_s: float) -> None:
+    """End this process some time after its supervisor, even if a library does not return.
+
+    While the supervisor lives it sees to that itself.
+    """
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def wait() -> None:
+        parent.join()
+        time.sleep(patience_s)
+        os._exit(1)
+
+    threading.Thread(target=wait, name="end with parent", daemon=True).start()
 
 
 def parent_is_alive() -> bool:

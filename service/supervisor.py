@@ -1,6 +1,7 @@
 """The supervisor: starts, watches and ends the processes, and can vent the device by itself."""
 
 import contextlib
+import faulthandler
 import os
 import select
 import signal
@@ -39,6 +40,9 @@ _PERIOD_S = 0.02
 HEARTBEAT_S = 0.1
 _FIRST_TICK_S = 20.0
 _END_S = 5.0
+
+#: The end takes no longer than this: more than all its patience together.
+LAST_RESORT_S = 50.0
 
 #: Libraries that would start threads of their own in every process.
 _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -143,9 +147,10 @@ class Supervisor:
             self._start_control()
             for line in start_facts(self._shared, self._realtime_fact()):
                 self._say(line)
-            self._start_others()
-            for path in start_mending(self._directory, self._context):
-                self._say(f"unfinished {path} was left by a crash; repairing it")
+            if not self._ending:
+                self._start_others()
+                for path in start_mending(self._directory, self._context):
+                    self._say(f"unfinished {path} was left by a crash; repairing it")
             status = self._watch()
         finally:
             self._end_children()
@@ -285,13 +290,19 @@ class Supervisor:
     def _end_children(self) -> None:
         """Control first, so that the arm is empty; the recorder last, so that it has all of it."""
         self._service_manager.stopping()
+        # Nothing below waits without a limit; should the end stand still all the same, this says
+        # where, and ends it: control vents by itself when its supervisor is gone.
+        faulthandler.dump_traceback_later(LAST_RESORT_S, exit=True)
         control = self._children.get("control")
         if control is not None:
             self._control_pipe.send(Shutdown())
+            control.end_if_loading()
             if not control.join(_END_S):
                 self._vent_without_control()
         for name in ("device", "gateway", "recorder", "viewer"):
             child = self._children.get(name)
+            if child is not None and name != "recorder":  # which has something to write
+                child.end_if_loading()
             if child is not None and not child.end(self._patience_s(name)):
                 self._say(f"WARNING    the {name} process did not end by itself and was killed")
         self._announcer.step()

@@ -24,7 +24,7 @@ from logs.topics import EVENT
 from logs.view import View
 from service import realtime
 from service.config import Configuration, rerun_url
-from service.process import Shared, ignore_terminal_signals, parent_is_alive
+from service.process import Shared, end_with_parent, ignore_terminal_signals, parent_is_alive
 
 _PERIOD_S = 1.0 / 30.0
 _PR_SET_PDEATHSIG = 1
@@ -34,6 +34,12 @@ _CATCH_UP_S = 3.0
 
 #: After standing still for this long (s), the server may have dropped the connection.
 _STALLED_S = 5.0
+
+#: Without a supervisor: a viewer that stalls would block this process without end.
+_ORPHAN_S = 3.0
+
+#: Bound before any fork: the child of a process with threads must not load a library.
+_PRCTL = ctypes.CDLL(None).prctl
 
 
 def start_server(configuration: Configuration) -> "subprocess.Popen[bytes]":
@@ -62,7 +68,7 @@ def _rerun_program() -> str:
 
 def _die_with_parent() -> None:
     """Make the kernel end this process with its parent, however that ends."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    _PRCTL(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def has_display() -> bool:
@@ -106,6 +112,7 @@ class Viewing:
 def main(shared: Shared, end: Connection) -> None:
     """Entry point of the process."""
     ignore_terminal_signals()
+    end_with_parent(_ORPHAN_S)
     realtime.step_back(10)
     configuration = shared.configuration
     server = start_server(configuration) if configuration.rerun.start_server else None

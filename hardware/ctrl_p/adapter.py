@@ -24,9 +24,8 @@ LEFT_BEHIND = (
     "closed valves keep the air in the chambers"
 )
 
-#: A reading waits so long for new telemetry, a setpoint for the one before it (s).
-READ_WAIT_S = 0.004
-WRITE_INTERVAL_S = 0.01
+#: A reading waits for new telemetry, as many of its periods at most.
+READ_WAIT_PERIODS = 1.5
 #: A setpoint that has not changed, a vent, and the question for the mode are repeated (s).
 REPEAT_S = 0.2
 
@@ -58,6 +57,7 @@ class CtrlP:
 
     #: It regulates the last setpoints for ever, whether its host lives or not.
     has_watchdog = False
+    left_behind = LEFT_BEHIND
 
     def __init__(self, arm: Arm, settings: CtrlPSettings) -> None:
         """Raise ConfigurationError where the wiring or the ceiling does not fit the arm."""
@@ -150,28 +150,32 @@ class CtrlP:
         return said if measured and isinstance(said, Telemetry) else None
 
     def read(self, time_s: float) -> Measurement:
-        """Return the newest telemetry, waiting a few milliseconds for it at most.
+        """Return the next telemetry, or the newest there is where none comes in its time.
 
         Raises HardwareError after ``timeout_s`` without any, for setpoints that were not sent, and
         once its own over-pressure protection has acted, until the next vent.
         """
         self._order.check(time_s)
-        for line in self._line.receive(READ_WAIT_S):
-            if line:
-                self._line.count(self._take(protocol.parse(line)), line)
-        if self._fresh:
-            self._heard_s, self._fresh = time_s, False
+        self._line.take_until(self._heard, READ_WAIT_PERIODS * self._settings.telemetry_s)
+        fresh, self._fresh = self._fresh, False
+        if fresh:
+            self._heard_s = time_s
         if time_s - self._heard_s > self._settings.timeout_s:
             raise self._line.error(f"has sent no telemetry for {time_s - self._heard_s:.1f} s")
         self._watch_mode(time_s)
         return Measurement(
             pressures_pa=self._values[Kind.MEASURED].copy(),
             lengths_m=self._unknown.copy(),
-            taken_s=self._heard_s,
+            taken_s=None if fresh else self._heard_s,
             setpoints_pa=self._values[Kind.SETPOINTS].copy(),
             supply_pa=self._supply_pa,
             complaints=(f"{WHAT}: {TRIPPED}",) if self._tripped else (),
         )
+
+    def _heard(self, line: bytes) -> bool:
+        """Take a line; return whether the channels' pressures have come by now."""
+        self._line.count(self._take(protocol.parse(line)), line)
+        return self._fresh
 
     def _take(self, said: Telemetry | Echo | None) -> bool:
         """Take what a line says; return whether it says anything."""
@@ -217,16 +221,14 @@ class CtrlP:
             self._asked_s = time_s
 
     def write(self, pressures_pa: Array, time_s: float) -> Array:
-        """Send setpoints (n_sections, 3); return those that it has now, in steps of 10 Pa.
+        """Send setpoints (n_sections, 3); return them as sent, in steps of 10 Pa.
 
-        Sooner than ``WRITE_INTERVAL_S`` after the last one nothing is sent, and the last is
-        returned. Raises HardwareError for a command that is none, and where it cannot be sent.
+        Raises HardwareError for a command that is none, and where it cannot be sent.
         """
         self._order.check(time_s)
         wanted = self._command.sendable_pa(pressures_pa)
-        elapsed_s = time_s - self._sent_s
-        changed = not self._armed or not np.array_equal(wanted, self._sent)
-        if elapsed_s >= (WRITE_INTERVAL_S if changed else REPEAT_S) or not self._armed:
+        overdue = time_s - self._sent_s >= REPEAT_S
+        if overdue or not self._armed or not np.array_equal(wanted, self._sent):
             self._line.send(protocol.setpoints(self._channels.scatter(wanted)))
             self._sent, self._sent_s = wanted, time_s
             self._setpoints.add(wanted)

@@ -25,10 +25,11 @@ LEFT_BEHIND = (
     "valves keep the air in the chambers until it has power again"
 )
 
-#: A reading waits so long for new feedback (s).
-READ_WAIT_S = 0.004
-#: Of commands that come sooner than this after another the firmware forgets one (s).
-WRITE_INTERVAL_S = 1.25 * protocol.PASS_S
+#: A reading waits so long for new feedback (s), which comes once a pass.
+READ_WAIT_S = 1.5 * protocol.PASS_S
+#: Of commands that come sooner than this after another the firmware forgets one (s). They follow
+#: feedback, and therefore one another, at one pass.
+WRITE_INTERVAL_S = 0.75 * protocol.PASS_S
 #: A command that the feedback does not show by then is sent again (s).
 REPEAT_S = 4.0 * protocol.PASS_S
 
@@ -63,6 +64,7 @@ class Esp32:
 
     #: It regulates the last setpoints for ever, whether its host lives or not.
     has_watchdog = False
+    left_behind = LEFT_BEHIND
 
     def __init__(self, arm: Arm, settings: Esp32Settings) -> None:
         """Raise ConfigurationError where the arm does not fit the controller, or the wiring."""
@@ -119,8 +121,8 @@ class Esp32:
         """Send zeros until the feedback shows them; raises HardwareError after ``wait_s``.
 
         The firmware forgets a command that comes right after another, and feedback from before the
-        zeros proves nothing: they are sent again every three passes, and only what is said two
-        passes after a repetition counts.
+        zeros proves nothing: they are sent again two passes later, when nothing else can be on its
+        way, and what is said two passes after that counts. Then the same again.
         """
         self._line.receive(0.0)
         passes = itertools.count(1)
@@ -131,9 +133,9 @@ class Esp32:
                 return None
             self._newest = feedback
             number = next(passes)
-            if number >= 5 and number % 3 == 2 and not any(feedback.targets_kpa):
+            if number % 4 == 0 and not any(feedback.targets_kpa):
                 return True
-            if number % 3 == 0:
+            if number % 4 == 2:
                 self._line.send(protocol.VENT)
             return None
 
@@ -141,19 +143,23 @@ class Esp32:
         self._line.wait_for(is_empty, wait_s, "zeros")
 
     def read(self, time_s: float) -> Measurement:
-        """Return the newest feedback, waiting a few milliseconds for it at most.
+        """Return the next feedback, or the newest there is where none comes in its time.
 
         Raises HardwareError after ``timeout_s`` without any, and for targets that were not sent.
         """
         self._order.check(time_s)
-        for line in self._line.receive(READ_WAIT_S):
-            if line:
-                self._line.count(self._take(protocol.parse(line)), line)
-        if self._fresh:
-            self._heard_s, self._fresh = time_s, False
+        self._line.take_until(self._heard, READ_WAIT_S)
+        fresh, self._fresh = self._fresh, False
+        if fresh:
+            self._heard_s = time_s
         if time_s - self._heard_s > self._settings.timeout_s:
             raise self._line.error(f"has sent no feedback for {time_s - self._heard_s:.1f} s")
-        return self._measurement(self._known())
+        return self._measurement(self._known(), None if fresh else self._heard_s)
+
+    def _heard(self, line: bytes) -> bool:
+        """Take a line; return whether it, or one before it, was feedback."""
+        self._line.count(self._take(protocol.parse(line)), line)
+        return self._fresh
 
     def _take(self, said: Feedback | Remark | None) -> bool:
         """Take what a line says; return whether it says anything."""
@@ -171,12 +177,12 @@ class Esp32:
             raise self._line.error("has sent no feedback yet")
         return self._newest
 
-    def _measurement(self, feedback: Feedback) -> Measurement:
+    def _measurement(self, feedback: Feedback, taken_s: float | None) -> Measurement:
         pressures_pa = self._channels.gather(feedback.pressures_kpa) * protocol.KPA
         return Measurement(
             pressures_pa=pressures_pa,
             lengths_m=self._lengths_m(feedback.potentiometers_mm),
-            taken_s=self._heard_s,
+            taken_s=taken_s,
             setpoints_pa=self._channels.gather(feedback.targets_kpa) * protocol.KPA,
             complaints=(f"{WHAT} says: {self._remark}",) if self._remark else (),
         )
@@ -215,11 +221,17 @@ class Esp32:
         return bool((np.abs(targets_pa - pressures_pa) <= _SAME_PA).all())
 
     def vent(self, time_s: float) -> None:
-        """Send zeros at once, and again while it is called until the feedback shows them."""
+        """Send zeros; after another command, wait four passes until the feedback shows them.
+
+        Raises HardwareError where it does not.
+        """
         time_s = self._order.at_any_time(time_s)
         zeros = np.zeros_like(self._sent)
-        overdue = time_s - self._sent_s >= REPEAT_S and not self._shows(zeros)
-        if self._sent.any() or overdue:
+        if self._sent.any():
+            self._sent, self._sent_s, self._heard_s = zeros, time_s, time_s
+            self._setpoints.add(zeros)
+            self._empty(self._settings.timeout_s)
+        elif time_s - self._sent_s >= REPEAT_S and not self._shows(zeros):
             self._send(zeros, time_s)
 
     def close(self) -> None:

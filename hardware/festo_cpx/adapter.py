@@ -47,6 +47,8 @@ class FestoCpx:
         self._arm, self._settings = arm, settings
         self._low_pa = arm.per_chamber("pressure_min_pa")
         self._high_pa = arm.per_chamber("pressure_max_pa")
+        self._no_lengths = np.full((arm.n_sections, 3), np.nan)
+        self._no_lengths.setflags(write=False)
         self._terminal = ModbusTerminal(
             NAME, settings.host, settings.port, settings.unit_id, settings.timeout_s
         )
@@ -73,10 +75,10 @@ class FestoCpx:
         self._check_setpoints(inputs)
         n_sections = self._arm.n_sections
         valves = self._settings.layout.valves
-        found = zip(valves, inputs.diagnosis, strict=True)
+        found = zip(valves, inputs.diagnosis, strict=True) if any(inputs.diagnosis) else ()
         return Measurement(
             pressures_pa=pressures_of(inputs.actual, n_sections),
-            lengths_m=np.full((n_sections, 3), np.nan),
+            lengths_m=self._no_lengths,
             setpoints_pa=pressures_of(inputs.setpoint, n_sections),
             complaints=tuple(complaint(valve, word) for valve, word in found if word),
         )
@@ -125,6 +127,9 @@ class FestoCpx:
 
     def _check_setpoints(self, inputs: CpxInputs) -> None:
         """Raise where the terminal has long shown a setpoint that none of our writes was."""
+        if inputs.setpoint == self._written[-1]:
+            self._mismatches = 0
+            return
         foreign = [
             index
             for index, shown in enumerate(inputs.setpoint)

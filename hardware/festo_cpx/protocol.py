@@ -5,6 +5,8 @@ diagnosis. Addresses are zero-based protocol addresses.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from math import copysign
 
 import numpy as np
 
@@ -47,16 +49,30 @@ class CpxLayout:
 
         Valves that follow each other without a gap share a write.
         """
-        register_of = {
-            self.output_base + self.output_stride * valve: from_signed(count)
-            for valve, count in zip(self.valves, counts, strict=True)
-        }
         return [
-            (first, [register_of[first + index] for index in range(length)])
-            for first, length in runs(register_of)
+            (address, [from_signed(counts[chamber]) for chamber in chambers])
+            for address, chambers in self._writes
         ]
 
-    @property
+    @cached_property
+    def _writes(self) -> list[tuple[int, list[int]]]:
+        """Address of every write, and the chambers whose counts it takes in their order."""
+        chamber_at = {
+            self.output_base + self.output_stride * valve: chamber
+            for chamber, valve in enumerate(self.valves)
+        }
+        return [
+            (first, [chamber_at[first + index] for index in range(length)])
+            for first, length in runs(chamber_at)
+        ]
+
+    @cached_property
+    def _input_places(self) -> list[int]:
+        """Where in an input block each chamber's three registers begin."""
+        first = min(self.valves)
+        return [self.input_stride * (valve - first) for valve in self.valves]
+
+    @cached_property
     def input_block(self) -> tuple[int, int]:
         """First register and how many hold every valve's three."""
         first, last = min(self.valves), max(self.valves)
@@ -64,8 +80,7 @@ class CpxLayout:
 
     def decode(self, registers: list[int]) -> "CpxInputs":
         """Return what an input block says, chamber by chamber."""
-        first = min(self.valves)
-        at = [self.input_stride * (valve - first) for valve in self.valves]
+        at = self._input_places
         return CpxInputs(
             actual=[to_signed(registers[index]) for index in at],
             setpoint=[to_signed(registers[index + 1]) for index in at],
@@ -84,9 +99,8 @@ class CpxInputs:
 
 def counts_of(pressures_pa: Array) -> list[int]:
     """Return whole counts, flat: the nearest that are no further from ambient than asked for."""
-    counts = pressures_pa.reshape(-1) / COUNT_PA
-    nudged = counts + np.copysign(_COUNT_TOLERANCE, counts)
-    return [int(count) for count in np.trunc(nudged).tolist()]
+    flat: list[float] = pressures_pa.reshape(-1).tolist()
+    return [int(value / COUNT_PA + copysign(_COUNT_TOLERANCE, value)) for value in flat]
 
 
 def pressures_of(counts: list[int], n_sections: int) -> Array:

@@ -11,7 +11,9 @@ from service.tables.table import Table
 class HardwareConfig(Table):
     """The device that moves the air. ``device`` empty means one simulator an arm."""
 
-    adapter: Literal["simulator", "festo-cpx", "festo-vtem"] = "simulator"
+    adapter: Literal["simulator", "festo-cpx", "festo-vtem", "ctrl-p", "esp32", "replay"] = (
+        "simulator"
+    )
     device: Annotated[str, Field(max_length=64, pattern=r"^[\x20-\x7e]*$")] = ""
     exchange_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
     accept_no_watchdog: bool = False

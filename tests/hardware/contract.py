@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -17,15 +19,17 @@ from hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
 from hardware.ctrl_p.emulator import CtrlPEmulator
 from hardware.ctrl_p.protocol import STEP_PA as CTRL_P_STEP_PA
 from hardware.emulation import EmulatedArm
-from hardware.esp32.adapter import WRITE_INTERVAL_S as ESP32_WRITE_INTERVAL_S
 from hardware.esp32.adapter import Esp32, Esp32Settings
 from hardware.esp32.emulator import Esp32Emulator
+from hardware.esp32.protocol import PASS_S as ESP32_PASS_S
 from hardware.esp32.protocol import STEP_PA as ESP32_STEP_PA
 from hardware.interface import Hardware
 from hardware.pseudo_terminal import PseudoTerminal
 from hardware.simulator.adapter import SimulatedArm
 from hardware.simulator.parameters import SimulatorParameters
+from logs.replay_device import ReplayDevice
 from service.config import load
+from tests.logs.test_replay_device import record
 
 #: With vacuum, and without.
 ARMS = {name: load(None, name).build_arm() for name in ("paper", "table1")}
@@ -147,8 +151,15 @@ def esp32(arm: Arm) -> Iterator[Bench]:
     with PseudoTerminal(emulator) as terminal:
         settings = Esp32Settings(str(terminal.path), valves, potentiometers, connect_timeout_s=1.0)
         bench = serial_bench(arm, Esp32(arm, settings), emulated, terminal, ESP32_STEP_PA)
-        bench.period_s = ESP32_WRITE_INTERVAL_S
+        bench.period_s = ESP32_PASS_S
         yield bench
+
+
+@contextmanager
+def replay(arm: Arm) -> Iterator[Bench]:
+    """A recorded session of the arm, 60 s long."""
+    with TemporaryDirectory() as folder:
+        yield Bench(arm, ReplayDevice(arm, record(Path(folder) / "log.mcap", arm, 6000)))
 
 
 def serial_bench(
@@ -182,6 +193,7 @@ DEVICES: dict[str, Factory] = {
     "simulator": simulator,
     "ctrl-p": ctrl_p,
     "esp32": esp32,
+    "replay": replay,
 }
 
 #: How far ``told_pa`` may be from what was sent, in Pa: the simulator has real valves.

@@ -10,9 +10,12 @@ from controllers.arm import Array
 from controllers.errors import HardwareError
 from hardware.interface import Hardware, Measurement
 from tests.hardware.contract import ARMS, DEVICES, TOLD_TOLERANCE_PA, Bench
+from tests.hardware.festo_bench import FESTO
+
+ALL = DEVICES | FESTO
 
 
-@pytest.fixture(params=DEVICES)
+@pytest.fixture(params=ALL)
 def device(request: pytest.FixtureRequest) -> str:
     """Name of the adapter."""
     name: str = request.param
@@ -22,7 +25,7 @@ def device(request: pytest.FixtureRequest) -> str:
 @pytest.fixture(params=ARMS)
 def bench(request: pytest.FixtureRequest, device: str) -> Iterator[Bench]:
     """The device with an arm on it; whatever a test leaves behind is closed."""
-    with DEVICES[device](ARMS[request.param]) as opened:
+    with ALL[device](ARMS[request.param]) as opened:
         yield opened
         opened.hardware.close()
 

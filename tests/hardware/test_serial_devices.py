@@ -231,17 +231,11 @@ def test_a_vent_that_an_esp32_forgot_is_sent_again() -> None:
     """Of two commands in one pass it carries out the first only."""
     with esp32() as (adapter, emulator, _):
         adapter.connect()
-        for _ in range(5):
+        for wait_s in np.linspace(0.0, 0.025, 10):
             adapter.write(LOW_PA, time.monotonic())
+            time.sleep(wait_s)
             adapter.vent(time.monotonic())
-            wait_for(lambda: _vented(adapter, emulator), "zeros", 2.0)
-
-
-def _vented(adapter: Esp32, emulator: Esp32Emulator) -> bool:
-    adapter.read(time.monotonic())
-    adapter.vent(time.monotonic())
-    targets = adapter.read(time.monotonic()).setpoints_pa
-    return targets is not None and not targets.any() and not emulator.arm.setpoints_pa.any()
+            assert not emulator.arm.setpoints_pa.any()
 
 
 def test_lengths_are_those_of_the_potentiometers_that_are_named() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import socket
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from service.doctor import device, machine, places, rights, timing
 from service.doctor.finding import Finding, Verdict, summary
 from service.local_stop import lock
 from service.tables.table import Table
-from tests.service.daemon import Daemon, free_port, run_command
+from tests.service.daemon import ROOT, Daemon, free_port, run_command
 
 
 def write(path: Path, text: str) -> None:
@@ -265,6 +266,8 @@ def test_the_command_says_one_finding_a_check_and_its_status(tmp_path: Path) -> 
     for name in ("configuration", "arm and device", "ports", "device"):
         assert by_name[name]["verdict"] == "ok", by_name[name]
     assert not daemon.logs.exists()
+    page = (ROOT / "docs" / "deployment.md").read_text()
+    assert checks == re.findall(r"^\| ([a-z][\w -]+) \| .* \| .* \|$", page, re.M)[1:]
 
 
 def test_a_wrong_configuration_is_told_and_the_machine_is_looked_at_all_the_same(
