@@ -13,6 +13,9 @@ ZERO_S = 0.3
 #: A monitor has seen enough of a broken sensor or valve after so long, and the ramp is over.
 _SEEN_S, _RAMPED_S = 2.0, 4.0
 
+#: A serial device that is there again is connected within so long.
+_AGAIN_S = 2.0
+
 Words = Callable[[Injection], str]
 
 
@@ -29,6 +32,32 @@ def _transport(words: Words) -> Callable[[Rig, Injection], None]:
         rig.emulator.inject("clear")
 
     return inject
+
+
+def _broken_lines(words: Words) -> Callable[[Rig, Injection], None]:
+    """Bytes are lost or wrong: lines that mean nothing are passed over, many are a fault."""
+
+    def inject(rig: Rig, injection: Injection) -> None:
+        assert rig.emulator is not None
+        injection.begin()
+        rig.emulator.inject(words(injection))
+        rig.wait_until(enough(1.0), "broken lines")
+        injection.must_stay(pb.ACTIVE, pb.FAULT)
+        rig.emulator.inject("clear")
+
+    return inject
+
+
+def _cable_out(rig: Rig, injection: Injection) -> None:
+    """Nobody can zero a device without a watchdog now: it is zeroed when it is there again."""
+    assert rig.emulator is not None
+    out_s = injection.random.uniform(0.3, 0.8)
+    injection.must_reach(pb.FAULT, within_s=0.6)
+    injection.zero_within_s = out_s + _AGAIN_S
+    injection.begin()
+    rig.emulator.inject(f"unplug {out_s:.3f}")
+    rig.wait_for_mode(pb.FAULT)
+    rig.wait_until(enough(out_s), "the cable")
 
 
 def _slow(rig: Rig, injection: Injection) -> None:
@@ -95,6 +124,17 @@ def _air(name: str, words: Words, policy: str = _RAMPED, *modes: int) -> Fault:
     return Fault(f"air: {name}", policy, inject, device=_CPX)
 
 
+def _serial(device: str) -> tuple[Fault, ...]:
+    lines = "goes on, or fault and zeros, latched"
+    garbage = _broken_lines(lambda injection: "garbage")
+    half = _broken_lines(_for("half-lines", 0.2, 0.6))
+    return (
+        Fault(f"{device}: garbage", lines, garbage, device=device),
+        Fault(f"{device}: half lines", lines, half, device=device),
+        Fault(f"{device}: cable out", "fault; zeros once it is back", _cable_out, device=device),
+    )
+
+
 FAULTS = (
     _tcp("TCP reset", lambda injection: "reset"),
     _tcp("TCP silence", _for("silence", 0.4, 1.0)),
@@ -112,4 +152,6 @@ FAULTS = (
     _air("valve stuck closed", _chamber("valve-stuck-closed")),
     _air("leak", _chamber("leak")),
     _air("supply lost", lambda i: "supply-lost", "holds or fault", pb.HOLD, pb.FAULT),
+    *_serial("ctrl-p"),
+    *_serial("esp32"),
 )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from tests.faults.program import Program
 
@@ -17,16 +18,41 @@ from tests.faults.program import Program
 EMPTY_PA = 1000.0
 
 
+#: Arms for devices that cannot move the default one: an ESP32's pump gives 0.13 bar.
+_ARMS: dict[str, dict[str, Any]] = {
+    "esp32": {
+        "arm": {
+            "sections": [
+                {
+                    "rest_length_mm": 200.0,
+                    "chamber_offset_mm": 38.0,
+                    "length_min_mm": 100.0,
+                    "length_max_mm": 300.0,
+                    "bend_max_deg": 150.0,
+                    "length_rate_max_mm_s": 200.0,
+                    "pressure_min_bar": 0.0,
+                    "pressure_max_bar": 0.12,
+                    "pressure_slew_max_bar_s": 0.6,
+                    "lengthening_mm_per_bar": 800.0,
+                }
+            ]
+        }
+    }
+}
+
+
 class Emulator:
     """`pneuarm emulate WHAT`, with the tables that make a daemon use it."""
 
     def __init__(self, what: str, folder: Path) -> None:
+        own = _ARMS.get(what, {})
+        arm = folder / f"{what}.toml"
+        arm.write_text(tomli_w.dumps(own))
         self.record = Path(tempfile.mkstemp(".jsonl", "device-", folder)[1])
-        port = ("--port", "0") if what.startswith("festo") else ()
         self._program = Program(
-            "pneuarm", "emulate", what, "--arm", "paper", *port, "--record", str(self.record)
+            "pneuarm", "emulate", what, "--arm", str(arm), "--record", str(self.record)
         )
-        self.tables = self._configuration()
+        self.tables = own | self._configuration()
         with contextlib.suppress(OSError):  # it stands for another machine, which has nothing else
             os.sched_setscheduler(self._program.process.pid, os.SCHED_FIFO, os.sched_param(70))
 

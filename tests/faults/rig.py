@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 from controllers.errors import PneuarmError
 from logs.schema import pneuarm_pb2 as pb
 from pneuarm import Client
-from service.loop import NEAR_ZERO_PA
-from tests.faults.emulator import Emulator, read_record
+from service.config import load
+from tests.faults.emulator import EMPTY_PA, Emulator, read_record
 from tests.faults.fault import Injection
 from tests.faults.program import Program
 from tests.service.daemon import Daemon, health_of, wait_for
@@ -53,12 +53,19 @@ class Rig:
         try:
             #: Between the time of the log and the monotonic clock, before anybody sets a clock.
             self.offset_ns = time.time_ns() - time.monotonic_ns()
-            self.daemon.start()
+            self._start()
             self._watcher = self.daemon.client("watcher")
         except BaseException:
             self.close()
             raise
         return self
+
+    def _start(self) -> None:
+        """Start the daemon; a machine with much else to do may take its time."""
+        self.daemon.launch()
+        wait_for(self.daemon._answers, lambda: f"an answer; it said: {self.daemon.output()}", 60.0)
+        highest_pa = load(self.daemon.config).build_arm().per_chamber("pressure_max_pa").max()
+        self._air_pa = max(2.5 * EMPTY_PA, 0.08 * highest_pa)
 
     def __exit__(
         self,
@@ -196,7 +203,7 @@ class Rig:
             state = self.watcher.state()
             if state.mode != pb.ACTIVE:
                 self.mover.ask("go", "moves")
-            return max((abs(p) for p in state.pressure_sent_pa), default=0.0) > 4 * NEAR_ZERO_PA
+            return max((abs(p) for p in state.pressure_sent_pa), default=0.0) > self._air_pa
 
         self.wait_until(has_air, "air in a moving arm", 20.0)
 
