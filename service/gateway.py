@@ -32,7 +32,7 @@ from service import network
 from service.commands import Heartbeat, ModeReply, Pipe, RequestMode
 from service.inbox import Inbox
 from service.lease import Lease
-from service.mode import ModeEvent
+from service.mode import Mode, ModeEvent
 from service.notes import Notes
 from service.process import Shared, end_with_parent, ignore_terminal_signals, parent_is_alive
 from service.publisher import Publisher
@@ -42,6 +42,9 @@ _HEARTBEAT_S = 0.05
 
 #: Without a supervisor: time for the last states, and for Zenoh to close.
 _ORPHAN_S = 3.0
+
+#: A stop without control's answer for so long is repeated; control answers in its next tick.
+_REPEAT_STOP_S = 0.02
 
 _EVENTS = {
     pb.ENABLE: ModeEvent.ENABLE,
@@ -69,7 +72,8 @@ class Gateway:
         self._inbox = Inbox(shared, stream, self._lease, self._publisher, self._notes)
         self._pending: dict[int, tuple[zenoh.Query, str, str]] = {}
         self._request_id = 2 * secrets.randbelow(2**40)  # no reply to a dead gateway matches
-        self._stop_asked = False
+        self._stop_asked = 0  # number of the newest request to stop that is not answered yet
+        self._stop_asked_s = 0.0
         self._declared = self._declare()
 
     def _declare(self) -> list[object]:
@@ -87,9 +91,13 @@ class Gateway:
         ]
 
     def _on_estop(self, sample: zenoh.Sample) -> None:
-        """Stop, whatever was sent and whoever sent it; asked again until a state shows it."""
-        self._stop_asked = True
-        self._request(ModeEvent.ESTOP, "a client")
+        """Stop, whatever was sent and whoever sent it; asked again until control has answered."""
+        self._ask_to_stop()
+
+    def _ask_to_stop(self) -> None:
+        with self._lock:
+            self._stop_asked = self._request(ModeEvent.ESTOP, "a client")
+            self._stop_asked_s = time.monotonic()
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:
@@ -144,18 +152,19 @@ class Gateway:
 
     def _request(
         self, event: ModeEvent, client: str, asked: tuple[zenoh.Query, str, str] | None = None
-    ) -> None:
-        """Pass an event to control; its reply goes to the query that asked, if one did."""
+    ) -> int:
+        """Pass an event to control, return its number; the reply goes to the query that asked."""
         with self._lock:
-            self._request_id += 2  # even: the gateway's
+            self._request_id = number = self._request_id + 2  # even: the gateway's
             if asked is not None:
-                self._pending[self._request_id] = asked
-            sent = self._requests.send(RequestMode(event, self._request_id, client))
+                self._pending[number] = asked
+            sent = self._requests.send(RequestMode(event, number, client))
             if not sent and asked is not None:
-                del self._pending[self._request_id]
+                del self._pending[number]
         if not sent and asked is not None:
             refusal = self._state_reply(False, "the control process does not answer", asked[2])
             self._reply(asked[0], refusal, asked[1])
+        return number
 
     def _state_reply(self, accepted: bool, reason: str, secret: str) -> pb.Reply:
         return pb.Reply(
@@ -176,6 +185,8 @@ class Gateway:
     def _answer(self, reply: ModeReply) -> None:
         with self._lock:
             asked = self._pending.pop(reply.request_id, None)
+            if reply.mode == Mode.ESTOP and reply.request_id >= self._stop_asked:
+                self._stop_asked = 0
         if asked is None:
             return
         query, encoding, secret = asked
@@ -206,13 +217,15 @@ class Gateway:
                 self._notes.log(HEALTH, health, time.monotonic_ns())
 
     def _insist_on_stop(self) -> None:
-        """Repeat a stop that no state shows yet, should its message have been lost."""
-        if not self._stop_asked:
-            return
-        if self._publisher.newest_mode == pb.ESTOP:
-            self._stop_asked = False
-        else:
-            self._request(ModeEvent.ESTOP, "a client")
+        """Repeat a stop that control has not answered yet, should its message have been lost.
+
+        A state that shows a stop is no answer: it may be that of the stop before, and a reset may
+        lie between. Nor is it repeated once it is answered: that would undo such a reset.
+        """
+        with self._lock:
+            waited_s = time.monotonic() - self._stop_asked_s
+            if self._stop_asked and waited_s > _REPEAT_STOP_S:
+                self._ask_to_stop()
 
     def _answer_until(self, until_s: float) -> None:
         """Pass control's replies on as they come, until it is time to publish."""

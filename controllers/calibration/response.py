@@ -173,7 +173,8 @@ def _fit_mode(
             columns = np.column_stack([modelled, np.ones_like(modelled)])
             gain, offset = np.linalg.lstsq(columns, measured, rcond=None)[0]
             time_s = STEP_S * np.arange(len(measured))
-            found.append(StepAnswer(time_s, measured, gain * modelled + offset))
+            fitted: Array = gain * modelled + offset
+            found.append(StepAnswer(time_s, measured, fitted))
         return found
 
     def rows(x: Array) -> Array:

@@ -3,6 +3,7 @@
 import math
 import os
 import signal
+import time
 from collections.abc import Iterator
 from itertools import islice
 
@@ -154,6 +155,16 @@ def test_stop_is_confirmed_latched_and_left_by_reset(client: Client, daemon: Dae
         client.enable()
     assert client.reset().mode == pb.IDLE
     client.enable()  # waits for the air to go
+
+
+def test_a_reset_stays_whatever_stop_came_before_it(client: Client) -> None:
+    for _ in range(8):
+        client.estop()
+        client.estop()  # the state shows a stop already, that of the one before
+        time.sleep(0.005)
+        assert client.reset().mode == pb.IDLE
+        time.sleep(0.05)
+        assert client.state().mode != pb.ESTOP
 
 
 def test_stop_that_nothing_shows_is_not_confirmed(client: Client, daemon: Daemon) -> None:

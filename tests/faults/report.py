@@ -1,0 +1,128 @@
+"""The table of a campaign, for the terminal and for docs/safety.md."""
+
+import statistics
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tests.faults.fault import Row
+from tests.faults.stop_latency import StopLatency
+
+BEGIN, END = "<!-- campaign -->", "<!-- /campaign -->"
+
+
+@dataclass
+class Report:
+    """What a campaign has found; the stop's latency is measured at its end."""
+
+    seed: int
+    rows: list[Row] = field(default_factory=list)
+    stop: StopLatency | None = None
+    seconds: float = 0.0
+    interrupted: bool = False
+
+    @property
+    def broken(self) -> list[str]:
+        """One line for every invariant that was broken, and how to see it again."""
+        lines = [
+            f"{i.fault}, seed {i.seed}: {what}  (again: python -m tests.faults --only "
+            f"{i.fault!r} --times 1 --seed {i.seed})"
+            for row in self.rows
+            for i in row.injections
+            for what in i.broken
+        ]
+        return lines + (self.stop.broken if self.stop else [])
+
+    def table(self) -> str:
+        """One row a fault, as Markdown."""
+        lines = [
+            "| fault | the arm | times | invariants kept | to the safe state, median | worst |",
+            "|---|---|---|---|---|---|",
+        ]
+        for row in self.rows:
+            kept = sum(i.kept for i in row.injections)
+            checks = sum(i.checks for i in row.injections)
+            cells = [row.fault.name, row.fault.policy, f"{len(row.injections)}"]
+            cells += [row.unable or f"{kept} of {checks}", *_times(row)]
+            lines.append(f"| {' | '.join(cells)} |")
+        return "\n".join(lines)
+
+    def markdown(self) -> str:
+        """Everything that stands between the comments of the page."""
+        injections = sum(len(row.injections) for row in self.rows)
+        day = datetime.now(UTC).strftime("%Y-%m-%d")
+        text = [
+            f"`make faults`, {day}: {injections} injections in {self.seconds / 60:.0f} min, seed "
+            f"{self.seed}, {len(self.broken)} invariants broken.",
+            self.table(),
+        ]
+        text += [figure for row in self.rows if (figure := figures(row))]
+        if self.stop:
+            text.append(self.stop.text())
+        if self.broken:
+            text.append("\n".join(f"- {line}" for line in self.broken))
+        return "\n\n".join(text)
+
+    def json(self) -> dict[str, Any]:
+        """The same for programs."""
+        return {
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "interrupted": self.interrupted,
+            "broken": self.broken,
+            "stop": self.stop.json() if self.stop else None,
+            "faults": [
+                {
+                    "fault": row.fault.name,
+                    "policy": row.fault.policy,
+                    "times": len(row.injections),
+                    "unable": row.unable,
+                    "kept": sum(i.kept for i in row.injections),
+                    "checks": sum(i.checks for i in row.injections),
+                    "to_safe_s": row.times_s,
+                    "figures": [i.figures for i in row.injections],
+                }
+                for row in self.rows
+            ],
+        }
+
+
+def _times(row: Row) -> list[str]:
+    times = row.times_s
+    if not times:
+        return ["", ""]
+    return [f"{1e3 * statistics.median(times):.0f} ms", f"{1e3 * times[-1]:.0f} ms"]
+
+
+def figures(row: Row) -> str:
+    """Say what else was measured of a fault: median and largest of every figure."""
+    names = sorted({name for i in row.injections for name in i.figures})
+    parts = []
+    for name in names:
+        values = [i.figures[name] for i in row.injections if name in i.figures]
+        label, scale, unit = _label(name)
+        median, largest = statistics.median(values) * scale, max(values) * scale
+        total = f", {sum(values):.0f} in all" if name == "payloads" else ""
+        parts.append(f"{label} {median:.3g}{unit} (largest {largest:.3g}{unit}{total})")
+    return f"{row.fault.name}: {'; '.join(parts)}." if parts else ""
+
+
+def _label(name: str) -> tuple[str, float, str]:
+    """Words, scale and unit of a figure; its unit is the end of its name."""
+    words, _, unit = name.rpartition("_")
+    scale, shown = {
+        "ms": (1.0, " ms"),
+        "hz": (1.0, " a second"),
+        "bytes": (1 / 2**20, " MiB"),
+    }.get(unit, (1.0, ""))
+    return (words.replace("_", " ") if shown else name), scale, shown
+
+
+def write_page(page: Path, text: str) -> None:
+    """Put the text between the comments of a page; raises ValueError where they are missing."""
+    before, begin, rest = page.read_text().partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"{page} lacks the comments {BEGIN} and {END}")
+    page.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}")

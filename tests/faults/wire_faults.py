@@ -1,0 +1,49 @@
+"""Garbage on the wire: it changes nothing; anything at all on the stop's key stops."""
+
+from logs.schema import pneuarm_pb2 as pb
+from logs.topics import full_key
+from tests.faults.fault import Fault, Injection
+from tests.faults.rig import Rig
+
+#: In one injection; thirty of them are more than the hundred thousand.
+PAYLOADS = 3_400
+
+#: What the gateway may grow by while it works on them, and keep: Zenoh's and Python's own pools.
+_GROWTH_BYTES = 24 * 2**20
+
+
+def _garbage(rig: Rig, injection: Injection) -> None:
+    fuzzer = rig.beside("fuzz", "tests.faults.fuzz")
+    rejected, gateway = rig.health().rejected_messages, rig.pid("gateway")
+    before = rig.memory_bytes("gateway")
+    injection.begin()
+    fuzzer.tell(f"{injection.seed} {PAYLOADS}")
+    injection.figures["payloads"] = float(fuzzer.hear("sent"))
+    injection.must_go_on()
+    rig.move()
+    injection.check("the gateway lives", rig.pid("gateway") == gateway)
+    grown = rig.memory_bytes("gateway") - before
+    injection.figures["gateway_grown_bytes"] = grown
+    injection.check(
+        "the gateway's memory", grown < _GROWTH_BYTES, f"grew by {grown / 2**20:.0f} MiB"
+    )
+    found = rig.health().rejected_messages - rejected
+    injection.check("garbage is refused and counted", found > 0.5 * PAYLOADS, f"only {found}")
+    injection.only_targets_of = "mover"
+
+
+def _anything_stops(rig: Rig, injection: Injection) -> None:
+    payload = injection.random.randbytes(injection.random.choice((0, 1, 100, 70_000)))
+    encoding = injection.random.choice(("", "application/json", "application/protobuf;x"))
+    injection.must_reach(pb.ESTOP, within_s=0.1)
+    key = full_key(rig.daemon.arm, "cmd/estop")
+    injection.begin()
+    rig.watcher._session.put(key, payload, encoding=encoding)
+    rig.wait_for_mode(pb.ESTOP)
+    rig.watcher.reset()
+
+
+FAULTS = (
+    Fault("garbage on every key", "goes on, refused; memory unchanged", _garbage),
+    Fault("anything on the stop's key", "stops", _anything_stops),
+)
