@@ -172,7 +172,7 @@ def _fit_mode(
             modelled = _swinging(static, x[0], x[1])
             columns = np.column_stack([modelled, np.ones_like(modelled)])
             gain, offset = np.linalg.lstsq(columns, measured, rcond=None)[0]
-            time_s = STEP_S * np.arange(len(measured))
+            time_s: Array = STEP_S * np.arange(len(measured), dtype=np.float64)
             fitted: Array = gain * modelled + offset
             found.append(StepAnswer(time_s, measured, fitted))
         return found
