@@ -21,6 +21,7 @@ from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
+from service.tables.monitors import MonitorsConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
 from service.tables.table import Table
 
@@ -34,6 +35,7 @@ class Configuration(Table):
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
     hardware: HardwareConfig = HardwareConfig()
+    monitors: MonitorsConfig = MonitorsConfig()
     simulator: SimulatorConfig = SimulatorConfig()
     zenoh: ZenohConfig = ZenohConfig()
     rerun: RerunConfig = RerunConfig()

@@ -5,6 +5,7 @@ The time is an argument: the same loop runs on the clock, and in simulated time 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from controllers.estimator import Estimator
 from controllers.settings import ControlSettings
 from controllers.targets import KIND_OF, PoseTarget, PositionTarget, Target, TargetKind
 from controllers.tasks.tip_pose import quaternion_from_rotation
-from hardware.guard import Guard
+from hardware.guard import Guard, Intervention
 from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
@@ -29,9 +30,16 @@ from service.commands import (
 )
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
+from service.monitors.settings import MonitorSettings
+from service.safety import Safety
 
 #: Gauge pressure below which a chamber counts as vented, Pa: ten times the sensors' noise.
 NEAR_ZERO_PA = 2000.0
+
+#: What the guard changed, and the field that counts the ticks in which it did.
+_GUARD_COUNTS = tuple(
+    (int(kind), f"guard_{kind.name.lower()}") for kind in Intervention if kind.name
+)
 
 
 @dataclass(frozen=True)
@@ -41,8 +49,10 @@ class LoopSettings:
     period_s: float
     control: ControlSettings
     timeouts: Timeouts
+    monitors: MonitorSettings
     start_ns: int
     start_unix_ns: int
+    supply_flow_max_pa_s: float = inf
 
 
 @dataclass(frozen=True)
@@ -68,8 +78,9 @@ class Loop:
         self._hardware = hardware
         self._controller = Controller(arm, settings.control)
         self._estimator = Estimator(arm)
-        self._guard = Guard(arm, settings.period_s)
+        self._guard = Guard(arm, settings.period_s, settings.supply_flow_max_pa_s)
         self._keeper = ModeKeeper(settings.timeouts, self._stamped(emit))
+        self._safety = Safety(arm, settings.monitors, self._keeper)
         self._tick = new_tick(arm.n_sections)
         self._record = self._tick.reshape(1).view(np.uint8).data
         self._low = arm.per_chamber("pressure_min_pa")
@@ -128,17 +139,17 @@ class Loop:
         """Tell something that changes no mode."""
         self._keeper.tell(level, code, text)
 
-    def fault(self, cause: str) -> None:
+    def _fault(self, error: Exception) -> None:
         """Latch a fault and vent at once; where even that fails, the next tick tries again."""
-        now_s = self._now_ns * 1e-9
+        cause, now_s = f"{type(error).__name__}: {error}", self._now_ns * 1e-9
         self._sent = np.zeros_like(self._sent)
         self._tick["pressure_sent_pa"] = self._tick["pressure_commanded_pa"] = self._sent
         try:
             self._hardware.vent(now_s)
-        except Exception as error:
-            cause += f"; the device could not be vented: {error}"
+        except Exception as vent_error:
+            cause += f"; the device could not be vented: {vent_error}"
             self._tick["pressure_sent_pa"] = np.nan
-        self._keeper.apply(ModeEvent.FAULT, now_s, cause=cause)
+        self._safety.failed(error, cause, now_s)
 
     def tick(
         self, now_ns: int, commands: list[Command], disk: Disk, timing: Timing
@@ -154,8 +165,10 @@ class Loop:
         replies: list[ModeReply] = []
         try:
             self._run(commands, replies, dt_s, disk)
+            self._safety.worked()
         except Exception as error:  # whatever it is: an arm that nobody controls must lose its air
-            self.fault(f"{type(error).__name__}: {error}")
+            self._fault(error)
+        self._tick["active_faults"] = self._safety.bits
         self._tick["mode"] = int(self._keeper.mode)
         return self._record, replies
 
@@ -164,12 +177,14 @@ class Loop:
     ) -> None:
         now_s = self._now_ns * 1e-9
         self._tick["pressure_measured_pa"] = np.nan  # a record of a failed reading shows no old one
+        self._tick["supply_pa"] = self._tick["measurement_age_s"] = np.nan
         try:
             measurement = self._hardware.read(now_s)
             self._tick["pressure_measured_pa"] = measurement.pressures_pa
         finally:  # a stop is heard and answered also when the device fails
             for command in commands:
                 self._take(command, now_s, replies)
+        self._safety.look(measurement, self._tick, self._tip_pose, self._sent, self._now_ns, dt_s)
         self._watch(now_s, disk)
         wanted = self._control(dt_s)
         self._send(wanted, now_s)
@@ -197,7 +212,8 @@ class Loop:
                 self._keeper.apply(request.event, now_s, request.client)
             reason = ""
         else:
-            reason = self._keeper.request(request.event, now_s, request.client)
+            blocked = self._safety.why_not(request.event, now_s)
+            reason = self._keeper.request(request.event, now_s, request.client, blocked)
         if before != Mode.ACTIVE and self._keeper.mode == Mode.ACTIVE:
             self._arm(before)
         return ModeReply(request.request_id, not reason, reason, self._keeper.mode, self.sequence)
@@ -236,10 +252,14 @@ class Loop:
             self._tick["tip_commanded_position_m"] = tip.position_m
             return self._controller.pressures_pa()
         self._tick["tip_commanded_position_m"] = np.nan
+        ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
+        if ramping is not None:
+            return ramping
         return self._sent  # hold keeps the last; in the vented modes it is zero already
 
     def _send(self, wanted: Array, now_s: float) -> None:
-        if self._keeper.mode in VENTED_MODES:
+        ramping = self._safety.ramping_pa(now_s) is not None
+        if self._keeper.mode in VENTED_MODES and not ramping:
             self._hardware.vent(now_s)
             self._sent = np.zeros_like(self._sent)
             self._guard.acknowledge(self._sent, now_s)
@@ -248,8 +268,15 @@ class Loop:
         guarded = self._guard.check(wanted, now_s, now_s)
         self._sent = self._hardware.write(guarded.pressures_pa, now_s)
         self._guard.acknowledge(self._sent, now_s)
-        self._interventions += bool(guarded.intervention)
-        self._tick["guard_intervention"] = int(guarded.intervention)
+        self._count(int(guarded.intervention))
+
+    def _count(self, intervention: int) -> None:
+        self._tick["guard_intervention"] = intervention
+        if intervention:
+            self._interventions += 1
+            for bit, field in _GUARD_COUNTS:
+                if intervention & bit:
+                    self._tick[field] += 1
 
     def _fill_heading(self, timing: Timing) -> None:
         """Write down what is known of every tick, even of one that fails."""
@@ -268,6 +295,9 @@ class Loop:
         tick["pressure_sent_pa"] = self._sent
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
+        tick["supply_pa"] = measurement.supply_pa
+        taken_s = measurement.taken_s
+        tick["measurement_age_s"] = 0.0 if taken_s is None else self._now_ns * 1e-9 - taken_s
         self._fill_estimate(measurement)
         self._fill_target()
         if measurement.true_tip is not None:
