@@ -18,12 +18,11 @@ class Setpoint:
 
     def look(self, seen: Seen) -> str:
         """Name the chamber, its setpoint and ours; without setpoints there is nothing to see."""
-        if seen.setpoints_pa is None:
-            return ""
-        foreign = self._foreign(seen.setpoints_pa, seen)
+        setpoints_pa = seen.setpoints_pa or []
+        foreign = self._foreign(setpoints_pa, seen)
         if not self._lasting.longer(foreign >= 0, seen.now_s, self._lasting_s):
             return ""
-        theirs, ours = seen.setpoints_pa[foreign], seen.sent_pa[foreign]
+        theirs, ours = setpoints_pa[foreign], seen.sent_pa[foreign]
         return f"{chamber(foreign)} is set to {bar(theirs)} on the device; we sent {bar(ours)}"
 
     def _foreign(self, setpoints_pa: list[float], seen: Seen) -> int:

@@ -224,7 +224,7 @@ def detection_s(preset: str, seed: int, name: str, at_most_s: float = 6.0) -> tu
     bench, faulty = bench_of(preset, seed, has_lengths="length" in name)
     bench.tip_pose = lambda: bench.newest["tip_true_position_m"]
     bench.activate()
-    follow(bench, 1.0 + 0.13 * seed)
+    follow(bench, 0.8 + 0.08 * seed)
     if breakage.holds:
         bench.ask(ModeEvent.HOLD)
         bench.run(1.0)
