@@ -21,12 +21,25 @@ CHAMBER_ANGLES_RAD.setflags(write=False)
 LENGTH_MARGIN_M = 1e-6
 
 
+#: Which chamber lengthens under which pressure, and how strongly.
+Row = tuple[float, float, float]
+Coupling = tuple[Row, Row, Row]
+
+#: Each chamber lengthens under its own pressure alone.
+UNCOUPLED: Coupling = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+#: A coupling whose smallest singular value is below this share of the largest has no safe inverse.
+_COUPLING_SINGULAR = 0.02
+
+
 @dataclass(frozen=True)
 class Section:
     """One section: three chambers parallel to the backbone between two rigid plates.
 
-    ``lengthening_m_per_pa`` and ``softening_m_per_pa2`` are the two coefficients of the
-    pressure-to-length map, see :mod:`controllers.actuation`.
+    The fields from ``lengthening_m_per_pa`` on are the calibrated map between pressure and length,
+    see :mod:`controllers.actuation`; their defaults are those of a section without load, coupling
+    and hysteresis. ``hysteresis_pa`` is half the width of the loop, ``coupling`` (3, 3) has one row
+    a chamber that lengthens and one column a chamber under pressure.
     """
 
     rest_length_m: float
@@ -40,9 +53,14 @@ class Section:
     pressure_slew_max_pa_s: float
     lengthening_m_per_pa: float
     softening_m_per_pa2: float = 0.0
+    coupling: Coupling = UNCOUPLED
+    hysteresis_pa: float = 0.0
+    bending_compliance_rad_per_n_m: float = 0.0
+    axial_compliance_m_per_n: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise InvalidInput where two bounds contradict each other."""
+        """Raise InvalidInput where two bounds contradict each other, or no inverse map exists."""
+        _invertible(self.coupling)
         _ordered("length_min_m", self.length_min_m, "rest_length_m", self.rest_length_m)
         _ordered("rest_length_m", self.rest_length_m, "length_max_m", self.length_max_m)
         _ordered("pressure_min_pa", self.pressure_min_pa, "pressure_max_pa", self.pressure_max_pa)
@@ -58,6 +76,18 @@ def _ordered(low_name: str, low: float, high_name: str, high: float) -> None:
         raise InvalidInput(f"{low_name} = {low:g} must be less than {high_name} = {high:g}")
 
 
+def _invertible(coupling: Coupling) -> None:
+    matrix = np.asarray(coupling, dtype=np.float64)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise InvalidInput(f"coupling = {coupling}: three rows of three finite numbers are needed")
+    values = np.linalg.svd(matrix, compute_uv=False)
+    if values[-1] < _COUPLING_SINGULAR * values[0]:
+        raise InvalidInput(
+            f"coupling = {matrix.tolist()}: its rows must be independent, so that every length "
+            "has its pressures"
+        )
+
+
 def _frozen(values: object) -> Array:
     array = np.asarray(values, dtype=np.float64)
     array.setflags(write=False)
@@ -65,16 +95,36 @@ def _frozen(values: object) -> Array:
 
 
 @dataclass(frozen=True)
+class Response:
+    """How the arm answers to a step of the pressures: dead time and lag of the valves, lowest mode.
+
+    ``delay_s`` and ``lag_s`` (first order) lie between the pressure sent and the pressure in the
+    chamber, ``mode_hz`` and ``damping_ratio`` (of the lowest bending mode) between that and the
+    shape of the arm.
+    """
+
+    delay_s: float = 0.005
+    lag_s: float = 0.06
+    mode_hz: float = 2.2
+    damping_ratio: float = 0.15
+
+
+@dataclass(frozen=True)
 class Arm:
-    """A named list of sections, base first, and how gravity acts on it.
+    """A named list of sections, base first, how gravity acts on it and how it answers.
 
     ``gravity_m_s2`` is the acceleration of gravity in the base frame (z from base to tip of the
-    straight arm): ``(0, 0, 9.81)`` is an arm that hangs.
+    straight arm): ``(0, 0, 9.81)`` is an arm that hangs. ``mass_kg`` is the mass of all sections,
+    spread evenly over their rest lengths; it acts only where a section has a compliance.
+    ``tool_m`` is the point in the tip frame that counts as the tip everywhere.
     """
 
     name: str
     sections: tuple[Section, ...]
     gravity_m_s2: tuple[float, float, float] = (0.0, 0.0, 9.81)
+    mass_kg: float = 1.0
+    response: Response = Response()
+    tool_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Raise InvalidInput for an arm without sections."""

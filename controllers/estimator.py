@@ -1,16 +1,40 @@
 """Chamber lengths and tip pose from what is measured."""
 
+from dataclasses import dataclass
+from enum import IntEnum
+
 import numpy as np
 
 from controllers.actuation import PressureMap
 from controllers.arm import Arm, Array
+from controllers.feedback import TipObserver
 from controllers.kinematics.compiled import CompiledKinematics, TipState
+
+
+class EstimateSource(IntEnum):
+    """What an estimated tip pose rests on, numbered as on the wire."""
+
+    NONE = 0
+    PRESSURES = 1
+    LENGTHS = 2
+    TIP_POSE = 3
+
+
+@dataclass(slots=True)
+class TipEstimate:
+    """Tip pose: position (3,), rotation (3, 3), standard deviation in m, and its source."""
+
+    position_m: Array
+    rotation: Array
+    sigma_m: float
+    source: EstimateSource
 
 
 class Estimator:
     """Lengths from a length sensor where there is one, else from the pressure through the map.
 
-    The tip pose follows by constant curvature; what load does to the arm is not in it.
+    The tip follows by constant curvature, corrected by what motion capture has taught; while it is
+    seen, the tip is where the response to the commands and the newest pose say.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -25,3 +49,19 @@ class Estimator:
     def tip(self, lengths_m: Array) -> TipState:
         """Tip pose for the lengths; the arrays are reused by the next call."""
         return self._kinematics.evaluate(lengths_m)
+
+    def tip_estimate(
+        self, lengths_m: Array, measured_lengths_m: Array, observer: TipObserver
+    ) -> TipEstimate:
+        """Tip pose from the best that there is now."""
+        if observer.seen:
+            position, rotation = observer.estimate()
+            return TipEstimate(position, rotation, observer.sigma_m, EstimateSource.TIP_POSE)
+        tip = self._kinematics.evaluate(lengths_m)
+        sensors = not np.isnan(measured_lengths_m).any()
+        return TipEstimate(
+            tip.position_m + observer.offset_m,
+            observer.rotation @ tip.rotation,
+            min(observer.sigma_m, observer.length_sigma_m) if sensors else observer.sigma_m,
+            EstimateSource.LENGTHS if sensors else EstimateSource.PRESSURES,
+        )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from controllers.arm import Array
+from controllers.shapes import Shape
 
 
 class LawName(IntEnum):
@@ -23,14 +24,18 @@ class TargetKind(IntEnum):
     TWIST = 3
     LENGTHS = 4
     PRESSURES = 5
+    TRAJECTORY = 10
+    CIRCLE = 11
+    LINE = 12
 
 
 @dataclass(frozen=True)
 class PositionTarget:
-    """Tip at ``position_m`` (3,)."""
+    """Tip at ``position_m`` (3,), a point that moves with ``velocity_m_s`` (3,) if one is given."""
 
     position_m: Array
     law: LawName = LawName.DEFAULT
+    velocity_m_s: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,37 @@ class PressuresTarget:
     law: LawName = LawName.DEFAULT
 
 
-Target = PositionTarget | PoseTarget | TwistTarget | LengthsTarget | PressuresTarget
+@dataclass(frozen=True)
+class ShapeTarget:
+    """Tip along a shape, whose own time begins when its ``key`` first arrives."""
+
+    shape: Shape
+    key: int
+    law: LawName = LawName.DEFAULT
+
+
+class TrajectoryTarget(ShapeTarget):
+    """Tip through timed waypoints."""
+
+
+class CircleTarget(ShapeTarget):
+    """Tip on a circle."""
+
+
+class LineTarget(ShapeTarget):
+    """Tip on a line, there and back."""
+
+
+Target = (
+    PositionTarget
+    | PoseTarget
+    | TwistTarget
+    | LengthsTarget
+    | PressuresTarget
+    | TrajectoryTarget
+    | CircleTarget
+    | LineTarget
+)
 
 KIND_OF = {
     PositionTarget: TargetKind.POSITION,
@@ -77,4 +112,7 @@ KIND_OF = {
     TwistTarget: TargetKind.TWIST,
     LengthsTarget: TargetKind.LENGTHS,
     PressuresTarget: TargetKind.PRESSURES,
+    TrajectoryTarget: TargetKind.TRAJECTORY,
+    CircleTarget: TargetKind.CIRCLE,
+    LineTarget: TargetKind.LINE,
 }

@@ -1,7 +1,8 @@
 """The record of one tick: an ArmState as a fixed-size numpy record, and both ways between them.
 
 `schema/pneuarm.proto` is the only definition. A repeated field of ArmState becomes an array whose
-size follows from its name: a position has 3 elements, an orientation 4, all others one a chamber.
+size follows from its name: a position, velocity or offset has 3 elements, an orientation
+4, all others one a chamber.
 An unknown array is NaN in the record and empty in the message.
 """
 
@@ -23,10 +24,14 @@ _TYPES = {
 }
 
 
+#: Endings of the names of vectors of the tip.
+_VECTORS = ("position_m", "velocity_m_s", "offset_m")
+
+
 def _size(field: Any, n_sections: int) -> tuple[int, ...]:
     if not field.is_repeated:
         return ()
-    if field.name.endswith("position_m"):
+    if field.name.endswith(_VECTORS):
         return (3,)
     if field.name.endswith("orientation_xyzw"):
         return (4,)

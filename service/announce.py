@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from logs.rings import MessageReader, Rings
 from logs.schema import pneuarm_pb2 as pb
 from logs.topics import EVENT
+from service import backends
 from service.config import rerun_url
 from service.network import is_loopback
 from service.process import Shared
@@ -20,17 +21,19 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
     configuration = shared.configuration
     arm, zenoh, rerun = configuration.arm, configuration.zenoh, configuration.rerun
     sections = len(arm.sections)
-    seed = configuration.simulator.seed
+    device = backends.address(configuration)
+    if configuration.hardware.adapter == "simulator":
+        device += f", seed {configuration.simulator.seed}"
     lines = [
         f"arm        {arm.name}: {sections} section{'s' * (sections > 1)}, {3 * sections} chambers",
-        f"adapter    {configuration.hardware.adapter} (device {configuration.device_address}, "
-        f"seed {seed})",
+        f"adapter    {configuration.hardware.adapter} (device {device})",
         f"rate       {configuration.control.rate_hz:g} Hz, law {configuration.control.law}",
         f"real time  {realtime}",
         f"zenoh      {', '.join(zenoh.listen)}",
         f"rerun      {rerun_url(configuration)}" if rerun.enabled else "rerun      off",
         f"log        {shared.info.log_path}",
     ]
+    lines += [f"WARNING    {text}" for text in backends.warnings(configuration)]
     exposed = [endpoint for endpoint in zenoh.listen if not is_loopback(endpoint)]
     if exposed:
         lines.append(

@@ -15,6 +15,7 @@ from service.usage import ProcessTable
 #: Module of each process; loaded in the child only, so that the parent stays small.
 MODULES = {
     "control": "service.control",
+    "device": "service.device",
     "gateway": "service.gateway",
     "recorder": "service.recording",
     "viewer": "service.viewing",

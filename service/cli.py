@@ -12,6 +12,9 @@ Command = Callable[[argparse.Namespace], int]
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 PRESETS = ("paper", "table1", "trunk")
+
+#: Devices that `emulate` knows; the modules are in service/commands_emulate.py.
+EMULATED = ("festo-cpx", "festo-vtem")
 _ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -31,6 +34,12 @@ def _demo(arguments: argparse.Namespace) -> int:
     from service.demo import demo
 
     return demo(arguments)
+
+
+def _emulate(arguments: argparse.Namespace) -> int:
+    from service.commands_emulate import emulate
+
+    return emulate(arguments)
 
 
 def _send(arguments: argparse.Namespace) -> int:
@@ -81,6 +90,18 @@ def _workspace(arguments: argparse.Namespace) -> int:
     return workspace(arguments)
 
 
+def _doctor(arguments: argparse.Namespace) -> int:
+    from service.doctor.command import doctor
+
+    return doctor(arguments)
+
+
+def _systemd(arguments: argparse.Namespace) -> int:
+    from service.systemd.unit import systemd
+
+    return systemd(arguments)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
@@ -88,10 +109,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_daemon(commands)
+    _add_emulate(commands)
     _add_client(commands)
     _add_logs(commands)
     _add_validate(commands)
     _add_workspace(commands)
+    _add_machine(commands)
     return parser
 
 
@@ -113,9 +136,21 @@ def _add_daemon(commands: Subparsers) -> None:
     run.add_argument("--viewer", action="store_true", help="open Rerun's window, with a display")
     demo = _command(commands, "demo", _demo, "Daemon and client as processes: circle, eight, ...")
     demo.add_argument("--seconds", type=float, default=30.0, help="length of the show (default 30)")
+    demo.add_argument("--adapter", choices=("simulator", *EMULATED), default="simulator")
     demo.add_argument("--arm", choices=PRESETS, default="paper")
     demo.add_argument("--seed", type=int, default=0, help="seed of the simulated arm")
     demo.add_argument("--json", action="store_true", help="one JSON object instead of the table")
+
+
+def _add_emulate(commands: Subparsers) -> None:
+    emulate = _command(commands, "emulate", _emulate, "A device without the device, for tests.")
+    emulate.add_argument("what", choices=EMULATED)
+    emulate.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
+    emulate.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
+    emulate.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
+    emulate.add_argument("--record", type=Path, metavar="FILE", help="what reaches it, JSON lines")
+    emulate.add_argument("--watchdog-ms", type=int, help="its own watchdog at power-on")
+    emulate.add_argument("--fail-safe", choices=("reset", "hold"), default="reset")
 
 
 def _add_client(commands: Subparsers) -> None:
@@ -199,6 +234,16 @@ def _add_workspace(commands: Subparsers) -> None:
     workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
     workspace.add_argument("--seed", type=int, default=0, help="seed of the random points")
     workspace.add_argument("--json", action="store_true", help="one JSON object instead of text")
+
+
+def _add_machine(commands: Subparsers) -> None:
+    doctor = _command(commands, "doctor", _doctor, "Is this PC ready, and what must be changed.")
+    doctor.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    systemd = _command(commands, "systemd", _systemd, "Print a unit file: the daemon as a service.")
+    systemd.add_argument("--user", help="who runs it (default: you)")
+    for parser in (doctor, systemd):
+        parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
+        parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

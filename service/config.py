@@ -14,12 +14,13 @@ from typing import Any, Literal, get_args
 
 import tomli_w
 from platformdirs import user_state_path
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ValidationError, model_validator
 
 from controllers.arm import Arm
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
+from service.tables.festo import FestoCpxConfig, FestoVtemConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.monitors import MonitorsConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
@@ -37,14 +38,28 @@ class Configuration(Table):
     hardware: HardwareConfig = HardwareConfig()
     monitors: MonitorsConfig = MonitorsConfig()
     simulator: SimulatorConfig = SimulatorConfig()
+    festo_cpx: FestoCpxConfig = FestoCpxConfig()
+    festo_vtem: FestoVtemConfig = FestoVtemConfig()
     zenoh: ZenohConfig = ZenohConfig()
     rerun: RerunConfig = RerunConfig()
     log: LogConfig = LogConfig()
 
+    @model_validator(mode="after")
+    def _simulated_as_controlled(self) -> "Configuration":
+        there, here = len((self.simulator.arm or self.arm).sections), len(self.arm.sections)
+        if there != here:
+            raise ValueError(
+                f"simulator.arm has {there} sections, arm has {here}; the numbers must be equal"
+            )
+        return self
+
     def build_arm(self) -> Arm:
-        """Return the arm in SI units."""
-        sections = tuple(section.section() for section in self.arm.sections)
-        return Arm(self.arm.name, sections, self.arm.gravity_m_s2)
+        """Return the arm that the controller believes in, in SI units."""
+        return self.arm.build()
+
+    def build_simulated_arm(self) -> Arm:
+        """Return the arm that the simulator makes real: ``arm`` where nothing else is said."""
+        return (self.simulator.arm or self.arm).build()
 
     @property
     def device_address(self) -> str:
@@ -53,7 +68,7 @@ class Configuration(Table):
 
     def to_toml(self) -> str:
         """Return the effective configuration as a file that gives it again."""
-        return tomli_w.dumps(self.model_dump(mode="python"))
+        return tomli_w.dumps(self.model_dump(mode="python", exclude_none=True))
 
 
 def log_directory(configuration: Configuration) -> Path:

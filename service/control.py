@@ -15,6 +15,7 @@ from logs.topics import EVENT
 from service import backends, realtime
 from service.clock import Clock
 from service.commands import Command, ModeReply, Pipe, Shutdown
+from service.device_link import LinkedDevice
 from service.loop import Loop, LoopSettings, Timing
 from service.mode_keeper import Timeouts
 from service.process import Shared, ignore_terminal_signals
@@ -37,7 +38,11 @@ class ControlProcess:
         arm = configuration.build_arm()
         self._ring = RingWriter(shared.rings.ticks)
         self._events = MessageWriter(shared.rings.control)
-        self._hardware: Hardware = backends.build(configuration, arm)
+        self._hardware: Hardware | LinkedDevice = (
+            backends.build(configuration, arm)
+            if shared.device is None
+            else LinkedDevice(shared.device)
+        )
         settings = LoopSettings(
             period_s=1.0 / control.rate_hz,
             control=control.settings(),

@@ -4,7 +4,7 @@ The time is an argument: the same loop runs on the clock, and in simulated time 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
@@ -12,10 +12,13 @@ import numpy as np
 from controllers.arm import Arm, Array
 from controllers.controller import Controller, Reach
 from controllers.estimator import Estimator
+from controllers.feedback import FeedbackSettings
 from controllers.settings import ControlSettings
-from controllers.targets import KIND_OF, PoseTarget, PositionTarget, Target, TargetKind
+from controllers.targets import KIND_OF, TargetKind
 from controllers.tasks.tip_pose import quaternion_from_rotation
+from controllers.trajectory import ReferenceLimits
 from hardware.guard import Guard, Intervention
+from hardware.guarded import GuardedDevice, GuardedHardware
 from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
@@ -28,10 +31,12 @@ from service.commands import (
     SetTarget,
     SetTipPose,
 )
+from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
 from service.monitors.settings import MonitorSettings
 from service.safety import Safety
+from service.steering import Steering
 
 #: Gauge pressure below which a chamber counts as vented, Pa: ten times the sensors' noise.
 NEAR_ZERO_PA = 2000.0
@@ -53,6 +58,8 @@ class LoopSettings:
     start_ns: int
     start_unix_ns: int
     supply_flow_max_pa_s: float = inf
+    reference: ReferenceLimits = field(default_factory=ReferenceLimits)
+    feedback: FeedbackSettings = field(default_factory=FeedbackSettings)
 
 
 @dataclass(frozen=True)
@@ -71,21 +78,29 @@ class Loop:
         self,
         arm: Arm,
         settings: LoopSettings,
-        hardware: Hardware,
+        hardware: Hardware | LinkedDevice,
         emit: Callable[[pb.Event], None],
     ) -> None:
         self._settings = settings
-        self._hardware = hardware
+        self._hardware = _guarded(hardware, arm, settings)
         self._controller = Controller(arm, settings.control)
         self._estimator = Estimator(arm)
-        self._guard = Guard(arm, settings.period_s, settings.supply_flow_max_pa_s)
         self._keeper = ModeKeeper(settings.timeouts, self._stamped(emit))
         self._safety = Safety(arm, settings.monitors, self._keeper)
+        self._steering = Steering(
+            arm,
+            self._controller,
+            settings.reference,
+            settings.feedback,
+            settings.period_s,
+            self._keeper.tell,
+        )
         self._tick = new_tick(arm.n_sections)
         self._record = self._tick.reshape(1).view(np.uint8).data
         self._low = arm.per_chamber("pressure_min_pa")
         self._high = arm.per_chamber("pressure_max_pa")
-        self._sent = np.zeros((arm.n_sections, 3))
+        self._tool_m = np.array(arm.tool_m)
+        self._sent = self._wanted = np.zeros((arm.n_sections, 3))
         self._target: SetTarget | None = None
         self._tip_pose: SetTipPose | None = None
         self._heartbeat_ns: int | None = None
@@ -124,7 +139,7 @@ class Loop:
         now_s += 1e-6
         self._fill(self._hardware.read(now_s), self._sent)
         self._controller.binding()
-        self._hardware.write(self._guard.check(self._sent, now_s, now_s).pressures_pa, now_s)
+        self._hardware.write(self._sent, now_s, now_s)
         self._hardware.vent(now_s)
 
     def start_at(self, now_ns: int) -> None:
@@ -184,10 +199,12 @@ class Loop:
         finally:  # a stop is heard and answered also when the device fails
             for command in commands:
                 self._take(command, now_s, replies)
-        self._safety.look(measurement, self._tick, self._tip_pose, self._sent, self._now_ns, dt_s)
+        sent = self._hardware.sent_pa
+        self._safety.look(measurement, self._tick, self._tip_pose, sent, self._now_ns, dt_s)
         self._watch(now_s, disk)
-        wanted = self._control(dt_s)
+        wanted = self._control(dt_s, now_s)
         self._send(wanted, now_s)
+        self._steering.observe(self._keeper.mode in VENTED_MODES)
         self._fill(measurement, wanted)
 
     def _take(self, command: Command, now_s: float, replies: list[ModeReply]) -> None:
@@ -196,11 +213,12 @@ class Loop:
                 self._heartbeat_ns, self._operator = self._now_ns, command.operator
             case SetTipPose():
                 self._tip_pose = command
+                self._steering.measure(command, self._now_ns)
             case SetTarget():
                 # Whatever arrives before the arm is active is dropped, not kept for later.
                 if self._keeper.mode == Mode.ACTIVE:
                     self._target = command
-                    self._controller.set_target(command.target)
+                    self._steering.set_target(command)
             case RequestMode():
                 replies.append(self._request(command, now_s))
 
@@ -221,7 +239,7 @@ class Loop:
     def _arm(self, before: Mode) -> None:
         """Start without a jump: from what was last sent in hold, else from the measurement."""
         measured = np.clip(self._tick["pressure_measured_pa"], self._low, self._high)
-        self._controller.start_from(self._sent if before == Mode.HOLD else measured)
+        self._steering.start_from(self._wanted if before == Mode.HOLD else measured)
         self._target = None
 
     def _watch(self, now_s: float, disk: Disk) -> None:
@@ -238,19 +256,22 @@ class Loop:
         )
         if self._keeper.mode != Mode.ACTIVE and self._target is not None:
             self._target = None
-            self._controller.set_target(None)
+            self._steering.stop()
 
     def _target_age_s(self) -> float | None:
         if self._target is None:
             return None
         return max(0.0, (self._now_ns - self._target.received_ns) * 1e-9)
 
-    def _control(self, dt_s: float) -> Array:
+    def _control(self, dt_s: float, now_s: float) -> Array:
         """Return the pressures wanted now, by mode."""
         if self._keeper.mode == Mode.ACTIVE:
-            tip = self._controller.step(dt_s)
-            self._tick["tip_commanded_position_m"] = tip.position_m
-            return self._controller.pressures_pa()
+            self._wanted = self._steering.step(dt_s)
+            self._tick["tip_commanded_position_m"] = self._steering.tip_m
+            dither_pa = self._steering.dither_pa(now_s)
+            if not dither_pa:
+                return self._wanted
+            return np.minimum(np.maximum(self._wanted + dither_pa, self._low), self._high)
         self._tick["tip_commanded_position_m"] = np.nan
         ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
         if ramping is not None:
@@ -262,21 +283,19 @@ class Loop:
         if self._keeper.mode in VENTED_MODES and not ramping:
             self._hardware.vent(now_s)
             self._sent = np.zeros_like(self._sent)
-            self._guard.acknowledge(self._sent, now_s)
             self._tick["guard_intervention"] = 0
             return
-        guarded = self._guard.check(wanted, now_s, now_s)
-        self._sent = self._hardware.write(guarded.pressures_pa, now_s)
-        self._guard.acknowledge(self._sent, now_s)
+        guarded = self._hardware.write(wanted, now_s, now_s)
+        self._sent = guarded.pressures_pa
         self._count(int(guarded.intervention))
 
     def _count(self, intervention: int) -> None:
         self._tick["guard_intervention"] = intervention
         if intervention:
             self._interventions += 1
-            for bit, field in _GUARD_COUNTS:
+            for bit, name in _GUARD_COUNTS:
                 if intervention & bit:
-                    self._tick[field] += 1
+                    self._tick[name] += 1
 
     def _fill_heading(self, timing: Timing) -> None:
         """Write down what is known of every tick, even of one that fails."""
@@ -292,7 +311,7 @@ class Loop:
         tick, controller = self._tick, self._controller
         tick["length_commanded_m"] = controller.lengths_m
         tick["pressure_commanded_pa"] = wanted
-        tick["pressure_sent_pa"] = self._sent
+        tick["pressure_sent_pa"] = self._hardware.sent_pa
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
         tick["supply_pa"] = measurement.supply_pa
@@ -302,7 +321,7 @@ class Loop:
         self._fill_target()
         if measurement.true_tip is not None:
             position, rotation = measurement.true_tip
-            tick["tip_true_position_m"] = position
+            tick["tip_true_position_m"] = position + rotation @ self._tool_m
             tick["tip_true_orientation_xyzw"] = quaternion_from_rotation(rotation)
         if self._tip_pose is not None:
             tick["tip_measured_position_m"] = self._tip_pose.position_m
@@ -311,11 +330,10 @@ class Loop:
 
     def _fill_estimate(self, measurement: Measurement) -> None:
         lengths = self._estimator.lengths_m(measurement.pressures_pa, measurement.lengths_m)
-        tip = self._estimator.tip(lengths)
+        tip = self._estimator.tip_estimate(lengths, measurement.lengths_m, self._steering.observer)
         self._tick["length_measured_m"] = measurement.lengths_m
         self._tick["length_estimated_m"] = lengths
-        self._tick["tip_estimated_position_m"] = tip.position_m
-        self._tick["tip_estimated_orientation_xyzw"] = quaternion_from_rotation(tip.rotation)
+        self._steering.fill(self._tick, tip)
 
     def _fill_target(self) -> None:
         tick, controller, target = self._tick, self._controller, self._target
@@ -333,11 +351,17 @@ class Loop:
         tick["target_kind"] = int(KIND_OF[type(target.target)])
         tick["target_sequence"] = target.sequence
         tick["target_age_s"] = self._target_age_s()
-        _fill_pose(tick, target.target)
+        position, quaternion = self._steering.goal()
+        tick["target_position_m"] = position
+        if quaternion is not None:
+            tick["target_orientation_xyzw"] = quaternion
 
 
-def _fill_pose(tick: np.ndarray, target: Target) -> None:
-    if isinstance(target, PositionTarget | PoseTarget):
-        tick["target_position_m"] = target.position_m
-    if isinstance(target, PoseTarget):
-        tick["target_orientation_xyzw"] = target.quaternion_xyzw
+def _guarded(
+    hardware: Hardware | LinkedDevice, arm: Arm, settings: LoopSettings
+) -> GuardedHardware:
+    """Put the guard right before the device; one in a process of its own has it there."""
+    if isinstance(hardware, LinkedDevice):
+        return hardware
+    guard = Guard(arm, settings.period_s, settings.supply_flow_max_pa_s)
+    return GuardedDevice(hardware, guard, arm.n_sections)

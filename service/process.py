@@ -8,6 +8,7 @@ from logs.rings import Rings
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import RecorderStatus, ViewerStatus
 from service.config import Configuration
+from service.device_link import DeviceLink
 from service.usage import ProcessTable
 
 #: Ctrl-C, the order to end, and a terminal that was closed.
@@ -27,6 +28,7 @@ class Shared:
     recorder: RecorderStatus
     viewer: ViewerStatus
     processes: ProcessTable
+    device: DeviceLink | None = None
 
     def unix_ns(self, monotonic_ns: int) -> int:
         """UTC of a monotonic time: UTC once at the start, plus monotonic time since."""

@@ -37,3 +37,8 @@ def step_back(nice: int) -> None:
     """Let the loop and everything else go first."""
     with contextlib.suppress(OSError):
         os.nice(nice)
+
+
+def drop_priority() -> None:
+    """Go back to ordinary scheduling."""
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from multiprocessing import get_context
 
-from controllers.errors import ConfigurationError, PneuarmError
+from controllers.errors import ConfigurationError
 from logs.ring import RingReader
 from logs.rings import MessageReader, MessageWriter, Rings
 from logs.schema import pneuarm_pb2 as pb
@@ -22,10 +22,13 @@ from service.announce import Announcer, start_facts
 from service.children import Child
 from service.commands import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from service.config import Configuration, log_directory
+from service.device_keeper import DeviceKeeper
+from service.device_link import DeviceLink
 from service.facts import info_of
 from service.local_stop import lock
 from service.mode import ModeEvent
 from service.network import check_free, read_config
+from service.notify import ServiceManager
 from service.process import ENDING_SIGNALS, Shared
 from service.repairing import start_mending
 from service.usage import ProcessTable
@@ -48,7 +51,8 @@ class Supervisor:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
         self._say = say
         self._arm_lock = lock("arm", configuration.arm.name)
-        self._device_lock = lock("device", configuration.device_address)
+        backends.check(configuration)
+        self._device_lock = lock("device", backends.address(configuration))
         self._check_ports(configuration)
         self._directory = log_directory(configuration)
         self._make_directory()
@@ -62,9 +66,11 @@ class Supervisor:
         self._requests = new_pipe()
         self._stream = new_pipe()
         self._children: dict[str, Child] = {}
+        self._device = self._keep_device(configuration)
         self._stop_asked: dict[int, socket.socket] = {}
         self._request_id = 1
         self._ending = False
+        self._service_manager = ServiceManager()
 
     @staticmethod
     def _check_ports(configuration: Configuration) -> None:
@@ -100,6 +106,9 @@ class Supervisor:
             recorder=RecorderStatus.create(self._context),
             viewer=ViewerStatus.create(self._context),
             processes=ProcessTable.create(self._context),
+            device=None
+            if backends.in_control(configuration)
+            else DeviceLink.create(self._context, arm.n_sections),
         )
         shared.processes.started("supervisor", os.getpid())
         return shared
@@ -112,6 +121,15 @@ class Supervisor:
             candidate = f"{name}-{number}"
         return candidate
 
+    def _keep_device(self, configuration: Configuration) -> DeviceKeeper | None:
+        """Prepare the device process, where the device has one."""
+        if self._shared.device is None:
+            return None
+        arguments = (self._shared, self._arm_lock, self._device_lock)
+        child = Child("device", self._context, arguments, self._shared.processes)
+        self._children["device"] = child
+        return DeviceKeeper(configuration, self._shared.device, child)
+
     # --- running ---------------------------------------------------------------------------
 
     def run(self) -> int:
@@ -120,6 +138,8 @@ class Supervisor:
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` sets it
                 signal.signal(number, self._on_signal)
         try:
+            if self._device is not None:
+                self._device.start(lambda: self._ending)
             self._start_control()
             for line in start_facts(self._shared, self._realtime_fact()):
                 self._say(line)
@@ -173,17 +193,29 @@ class Supervisor:
         while not self._ending:
             self._serve_local_stop(_PERIOD_S)
             self._announcer.step()
+            self._look_after_device()
             self._revive()
             head, now_s = self._ticks.head(), time.monotonic()
             if head != newest:
                 newest, seen_s = head, now_s
+                self._service_manager.alive(now_s)
             elif now_s - seen_s > HEARTBEAT_S or not self._children["control"].is_alive():
                 self._vent_without_control()
                 return 3
         return 0
 
+    def _look_after_device(self) -> None:
+        """A dead or stuck device process: zero the device from here, until it is there again."""
+        if self._device is not None and (failed := self._device.look_after()):
+            self._tell(
+                pb.ERROR,
+                "vent_failed",
+                f"the device process is lost and the device could not be vented: {failed}",
+                remedy="cut the air supply; the device's own watchdog zeroes it where it has one",
+            )
+
     def _revive(self) -> None:
-        """Start dead gateway, recorder and viewer again; the arm goes on, or holds by itself."""
+        """Start dead processes but control again; the arm goes on, holds, or is in fault."""
         for name, child in self._children.items():
             if name != "control" and child.revive_if_due():
                 self._tell(
@@ -195,19 +227,15 @@ class Supervisor:
 
     def _vent_without_control(self) -> None:
         """Control is dead or stopped: kill it for good, then zero the device from here."""
+        self._service_manager.stopping()  # or its watchdog might cut this short
         self._children["control"].kill()
         cause = "the control process died, or made no tick for 100 ms"
-        try:
-            configuration = self._shared.configuration
-            device = backends.build(configuration, configuration.build_arm())
-            device.connect()
-            device.vent(time.monotonic_ns() * 1e-9)
-            device.close()
-        except PneuarmError as error:
+        # A device inside of control is gone with it, and its pressures with that.
+        if self._device is not None and (failed := self._device.zero()):
             self._tell(
                 pb.ERROR,
                 "vent_failed",
-                f"control is lost and the device could not be vented: {error}",
+                f"control is lost and the device could not be vented: {failed}",
                 cause,
                 "cut the air supply; the device's own watchdog zeroes it where it has one",
             )
@@ -256,12 +284,13 @@ class Supervisor:
 
     def _end_children(self) -> None:
         """Control first, so that the arm is empty; the recorder last, so that it has all of it."""
+        self._service_manager.stopping()
         control = self._children.get("control")
         if control is not None:
             self._control_pipe.send(Shutdown())
             if not control.join(_END_S):
                 self._vent_without_control()
-        for name in ("gateway", "recorder", "viewer"):
+        for name in ("device", "gateway", "recorder", "viewer"):
             child = self._children.get(name)
             if child is not None and not child.end(self._patience_s(name)):
                 self._say(f"WARNING    the {name} process did not end by itself and was killed")
@@ -269,7 +298,7 @@ class Supervisor:
 
     @staticmethod
     def _patience_s(name: str) -> float:
-        return 30.0 if name == "recorder" else 2.0
+        return {"recorder": 30.0, "device": 6.0}.get(name, 2.0)
 
     def _tell(
         self, level: "pb.Level", code: str, text: str, cause: str = "", remedy: str = ""

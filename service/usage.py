@@ -8,7 +8,7 @@ from typing import Any
 
 from logs.schema import pneuarm_pb2 as pb
 
-NAMES = ("supervisor", "control", "gateway", "recorder", "viewer", "rerun")
+NAMES = ("supervisor", "control", "gateway", "recorder", "viewer", "rerun", "device")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 

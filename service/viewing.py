@@ -108,23 +108,27 @@ def main(shared: Shared, end: Connection) -> None:
     ignore_terminal_signals()
     realtime.step_back(10)
     configuration = shared.configuration
-    server = start_server(configuration)
-    shared.processes.started("rerun", server.pid)
+    server = start_server(configuration) if configuration.rerun.start_server else None
+    if server is not None:
+        shared.processes.started("rerun", server.pid)
     try:
         _run(shared, end, server)
     finally:
-        server.terminate()
+        if server is not None:
+            server.terminate()
         os._exit(0)  # Rerun would wait for a server that is gone
 
 
-def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes]") -> None:
-    """Show until told to end. Without its server the viewer ends too, to be started anew."""
+def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes] | None") -> None:
+    """Show until told to end. If its own server ends the viewer ends too, to be started anew."""
     configuration = shared.configuration
     recording, view = _connect(shared)
     if configuration.rerun.open_viewer and has_display():
         open_viewer(rerun_url(configuration))
     viewing, stepped_s = Viewing(shared, view), time.monotonic()
-    while not end.poll(_PERIOD_S) and parent_is_alive() and server.poll() is None:
+    while not end.poll(_PERIOD_S) and parent_is_alive():
+        if server is not None and server.poll() is not None:
+            break
         if time.monotonic() - stepped_s > _STALLED_S:
             recording, viewing.view = _connect(shared)
         stepped_s = time.monotonic()
@@ -136,7 +140,8 @@ def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes]") -> 
 def _connect(shared: Shared) -> tuple[rr.RecordingStream, View]:
     """Open the recording at the server, or go on with it over a new connection."""
     configuration = shared.configuration
-    recording = rr.RecordingStream(f"pneuarm_{configuration.arm.name}", recording_id=shared.session)
+    name = configuration.rerun.recording or shared.session
+    recording = rr.RecordingStream(f"pneuarm_{configuration.arm.name}", recording_id=name)
     recording.connect_grpc(rerun_url(configuration))
     view = View(configuration.build_arm(), recording)
     view.start()

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Arm, Array, Section
+from controllers.arm import Arm, Array
 from controllers.errors import InvalidInput
 from controllers.kinematics.smooth import Smooth, from_quarter, series
 
@@ -72,30 +72,31 @@ def _section_with_jacobian(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX
     return arc_length * direction, rotation, jacobian
 
 
-def _shape(lengths: ca.SX, section: Section) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """``(L, u, v)`` of the three lengths of a section."""
+def symbolic_shape(lengths: ca.SX, section: Any) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """``(L, u, v)`` of the three lengths of a section, whose fields may be symbols too."""
     first, second, third = lengths[0], lengths[1], lengths[2]
     u = ((second - first) + (third - first)) / (3.0 * section.chamber_offset_m)
     v = (third - second) / (np.sqrt(3.0) * section.chamber_offset_m)
     return (first + second + third) / 3.0, u, v
 
 
-def _over_lengths(jacobian: ca.SX, section: Section) -> ca.SX:
+def _over_lengths(jacobian: ca.SX, section: Any) -> ca.SX:
     """Columns over ``(L, u, v)`` turned into columns over the three lengths."""
     d = section.chamber_offset_m
     mean, along = jacobian[:, 0] / 3.0, jacobian[:, 1] / (3.0 * d)
     across, side = jacobian[:, 2] / (np.sqrt(3.0) * d), mean + along
-    return ca.horzcat(mean - 2.0 * along, side - across, side + across)
+    columns: ca.SX = ca.horzcat(mean - 2.0 * along, side - across, side + across)
+    return columns
 
 
-def symbolic_tip(arm: Arm, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def symbolic_tip(arm: Any, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Position, rotation and Jacobian (6, n_chambers) of the tip, ``lengths`` in C order.
 
     Walking from the tip to the base: a section turns what follows it and moves it by its lever.
     """
-    position, rotation, columns = ca.SX(3, 1), ca.SX.eye(3), ca.SX(6, 0)
+    position, rotation, columns = ca.SX(ca.DM(arm.tool_m)), ca.SX.eye(3), ca.SX(6, 0)
     for index in reversed(range(arm.n_sections)):
-        shape = _shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
+        shape = symbolic_shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
         step, turn, local = _section_with_jacobian(*shape)
         lever = turn @ position
         linear = local[:3, :] - ca.skew(lever) @ local[3:, :]

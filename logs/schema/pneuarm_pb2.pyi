@@ -31,6 +31,16 @@ class TargetKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     TWIST: _ClassVar[TargetKind]
     LENGTHS: _ClassVar[TargetKind]
     PRESSURES: _ClassVar[TargetKind]
+    TRAJECTORY: _ClassVar[TargetKind]
+    CIRCLE: _ClassVar[TargetKind]
+    LINE: _ClassVar[TargetKind]
+
+class EstimateSource(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    NO_SOURCE: _ClassVar[EstimateSource]
+    FROM_PRESSURES: _ClassVar[EstimateSource]
+    FROM_LENGTHS: _ClassVar[EstimateSource]
+    FROM_TIP_POSE: _ClassVar[EstimateSource]
 
 class Reach(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -71,6 +81,13 @@ POSE: TargetKind
 TWIST: TargetKind
 LENGTHS: TargetKind
 PRESSURES: TargetKind
+TRAJECTORY: TargetKind
+CIRCLE: TargetKind
+LINE: TargetKind
+NO_SOURCE: EstimateSource
+FROM_PRESSURES: EstimateSource
+FROM_LENGTHS: EstimateSource
+FROM_TIP_POSE: EstimateSource
 NO_REACH: Reach
 MOVING: Reach
 REACHED: Reach
@@ -110,12 +127,14 @@ class Quaternion(_message.Message):
     def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ..., w: _Optional[float] = ...) -> None: ...
 
 class PositionTarget(_message.Message):
-    __slots__ = ("frame_id", "position_m")
+    __slots__ = ("frame_id", "position_m", "velocity_m_s")
     FRAME_ID_FIELD_NUMBER: _ClassVar[int]
     POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_M_S_FIELD_NUMBER: _ClassVar[int]
     frame_id: str
     position_m: Vector3
-    def __init__(self, frame_id: _Optional[str] = ..., position_m: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
+    velocity_m_s: Vector3
+    def __init__(self, frame_id: _Optional[str] = ..., position_m: _Optional[_Union[Vector3, _Mapping]] = ..., velocity_m_s: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
 
 class PoseTarget(_message.Message):
     __slots__ = ("frame_id", "position_m", "orientation")
@@ -151,8 +170,60 @@ class PressuresTarget(_message.Message):
     pressure_pa: _containers.RepeatedScalarFieldContainer[float]
     def __init__(self, pressure_pa: _Optional[_Iterable[float]] = ...) -> None: ...
 
+class Waypoint(_message.Message):
+    __slots__ = ("time_s", "position_m")
+    TIME_S_FIELD_NUMBER: _ClassVar[int]
+    POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    time_s: float
+    position_m: Vector3
+    def __init__(self, time_s: _Optional[float] = ..., position_m: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
+
+class TrajectoryTarget(_message.Message):
+    __slots__ = ("frame_id", "id", "waypoints")
+    FRAME_ID_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    WAYPOINTS_FIELD_NUMBER: _ClassVar[int]
+    frame_id: str
+    id: int
+    waypoints: _containers.RepeatedCompositeFieldContainer[Waypoint]
+    def __init__(self, frame_id: _Optional[str] = ..., id: _Optional[int] = ..., waypoints: _Optional[_Iterable[_Union[Waypoint, _Mapping]]] = ...) -> None: ...
+
+class CircleTarget(_message.Message):
+    __slots__ = ("frame_id", "id", "center_m", "normal", "radius_m", "frequency_hz", "turns")
+    FRAME_ID_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    CENTER_M_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_FIELD_NUMBER: _ClassVar[int]
+    RADIUS_M_FIELD_NUMBER: _ClassVar[int]
+    FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
+    TURNS_FIELD_NUMBER: _ClassVar[int]
+    frame_id: str
+    id: int
+    center_m: Vector3
+    normal: Vector3
+    radius_m: float
+    frequency_hz: float
+    turns: float
+    def __init__(self, frame_id: _Optional[str] = ..., id: _Optional[int] = ..., center_m: _Optional[_Union[Vector3, _Mapping]] = ..., normal: _Optional[_Union[Vector3, _Mapping]] = ..., radius_m: _Optional[float] = ..., frequency_hz: _Optional[float] = ..., turns: _Optional[float] = ...) -> None: ...
+
+class LineTarget(_message.Message):
+    __slots__ = ("frame_id", "id", "start_m", "end_m", "period_s", "repeats")
+    FRAME_ID_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    START_M_FIELD_NUMBER: _ClassVar[int]
+    END_M_FIELD_NUMBER: _ClassVar[int]
+    PERIOD_S_FIELD_NUMBER: _ClassVar[int]
+    REPEATS_FIELD_NUMBER: _ClassVar[int]
+    frame_id: str
+    id: int
+    start_m: Vector3
+    end_m: Vector3
+    period_s: float
+    repeats: float
+    def __init__(self, frame_id: _Optional[str] = ..., id: _Optional[int] = ..., start_m: _Optional[_Union[Vector3, _Mapping]] = ..., end_m: _Optional[_Union[Vector3, _Mapping]] = ..., period_s: _Optional[float] = ..., repeats: _Optional[float] = ...) -> None: ...
+
 class Target(_message.Message):
-    __slots__ = ("client_id", "lease_secret", "sequence", "state_sequence", "law", "position", "pose", "twist", "lengths", "pressures")
+    __slots__ = ("client_id", "lease_secret", "sequence", "state_sequence", "law", "position", "pose", "twist", "lengths", "pressures", "trajectory", "circle", "line")
     CLIENT_ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_SECRET_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -163,6 +234,9 @@ class Target(_message.Message):
     TWIST_FIELD_NUMBER: _ClassVar[int]
     LENGTHS_FIELD_NUMBER: _ClassVar[int]
     PRESSURES_FIELD_NUMBER: _ClassVar[int]
+    TRAJECTORY_FIELD_NUMBER: _ClassVar[int]
+    CIRCLE_FIELD_NUMBER: _ClassVar[int]
+    LINE_FIELD_NUMBER: _ClassVar[int]
     client_id: str
     lease_secret: str
     sequence: int
@@ -173,7 +247,10 @@ class Target(_message.Message):
     twist: TwistTarget
     lengths: LengthsTarget
     pressures: PressuresTarget
-    def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., sequence: _Optional[int] = ..., state_sequence: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., position: _Optional[_Union[PositionTarget, _Mapping]] = ..., pose: _Optional[_Union[PoseTarget, _Mapping]] = ..., twist: _Optional[_Union[TwistTarget, _Mapping]] = ..., lengths: _Optional[_Union[LengthsTarget, _Mapping]] = ..., pressures: _Optional[_Union[PressuresTarget, _Mapping]] = ...) -> None: ...
+    trajectory: TrajectoryTarget
+    circle: CircleTarget
+    line: LineTarget
+    def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., sequence: _Optional[int] = ..., state_sequence: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., position: _Optional[_Union[PositionTarget, _Mapping]] = ..., pose: _Optional[_Union[PoseTarget, _Mapping]] = ..., twist: _Optional[_Union[TwistTarget, _Mapping]] = ..., lengths: _Optional[_Union[LengthsTarget, _Mapping]] = ..., pressures: _Optional[_Union[PressuresTarget, _Mapping]] = ..., trajectory: _Optional[_Union[TrajectoryTarget, _Mapping]] = ..., circle: _Optional[_Union[CircleTarget, _Mapping]] = ..., line: _Optional[_Union[LineTarget, _Mapping]] = ...) -> None: ...
 
 class ModeRequest(_message.Message):
     __slots__ = ("client_id", "lease_secret", "action", "take_over")
@@ -204,7 +281,7 @@ class Reply(_message.Message):
     def __init__(self, accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., lease_secret: _Optional[str] = ..., lease_holder: _Optional[str] = ..., state_sequence: _Optional[int] = ...) -> None: ...
 
 class ArmState(_message.Message):
-    __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "active_faults", "supply_pa", "measurement_age_s", "guard_range", "guard_slew", "guard_not_finite", "guard_too_old", "guard_supply")
+    __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "active_faults", "supply_pa", "measurement_age_s", "guard_range", "guard_slew", "guard_not_finite", "guard_too_old", "guard_supply", "reference_position_m", "reference_velocity_m_s", "reference_error_m", "tip_model_position_m", "tip_offset_m", "tip_offset_orientation_xyzw", "tip_estimated_sigma_m", "tip_estimated_source", "tip_poses_refused")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     TIME_UNIX_NS_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
@@ -246,6 +323,15 @@ class ArmState(_message.Message):
     GUARD_NOT_FINITE_FIELD_NUMBER: _ClassVar[int]
     GUARD_TOO_OLD_FIELD_NUMBER: _ClassVar[int]
     GUARD_SUPPLY_FIELD_NUMBER: _ClassVar[int]
+    REFERENCE_POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    REFERENCE_VELOCITY_M_S_FIELD_NUMBER: _ClassVar[int]
+    REFERENCE_ERROR_M_FIELD_NUMBER: _ClassVar[int]
+    TIP_MODEL_POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    TIP_OFFSET_M_FIELD_NUMBER: _ClassVar[int]
+    TIP_OFFSET_ORIENTATION_XYZW_FIELD_NUMBER: _ClassVar[int]
+    TIP_ESTIMATED_SIGMA_M_FIELD_NUMBER: _ClassVar[int]
+    TIP_ESTIMATED_SOURCE_FIELD_NUMBER: _ClassVar[int]
+    TIP_POSES_REFUSED_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     time_unix_ns: int
     mode: Mode
@@ -287,7 +373,16 @@ class ArmState(_message.Message):
     guard_not_finite: int
     guard_too_old: int
     guard_supply: int
-    def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., active_faults: _Optional[int] = ..., supply_pa: _Optional[float] = ..., measurement_age_s: _Optional[float] = ..., guard_range: _Optional[int] = ..., guard_slew: _Optional[int] = ..., guard_not_finite: _Optional[int] = ..., guard_too_old: _Optional[int] = ..., guard_supply: _Optional[int] = ...) -> None: ...
+    reference_position_m: _containers.RepeatedScalarFieldContainer[float]
+    reference_velocity_m_s: _containers.RepeatedScalarFieldContainer[float]
+    reference_error_m: float
+    tip_model_position_m: _containers.RepeatedScalarFieldContainer[float]
+    tip_offset_m: _containers.RepeatedScalarFieldContainer[float]
+    tip_offset_orientation_xyzw: _containers.RepeatedScalarFieldContainer[float]
+    tip_estimated_sigma_m: float
+    tip_estimated_source: EstimateSource
+    tip_poses_refused: int
+    def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., active_faults: _Optional[int] = ..., supply_pa: _Optional[float] = ..., measurement_age_s: _Optional[float] = ..., guard_range: _Optional[int] = ..., guard_slew: _Optional[int] = ..., guard_not_finite: _Optional[int] = ..., guard_too_old: _Optional[int] = ..., guard_supply: _Optional[int] = ..., reference_position_m: _Optional[_Iterable[float]] = ..., reference_velocity_m_s: _Optional[_Iterable[float]] = ..., reference_error_m: _Optional[float] = ..., tip_model_position_m: _Optional[_Iterable[float]] = ..., tip_offset_m: _Optional[_Iterable[float]] = ..., tip_offset_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_estimated_sigma_m: _Optional[float] = ..., tip_estimated_source: _Optional[_Union[EstimateSource, str]] = ..., tip_poses_refused: _Optional[int] = ...) -> None: ...
 
 class Event(_message.Message):
     __slots__ = ("time_unix_ns", "level", "source", "code", "text", "cause", "remedy", "client_id", "mode", "payload")

@@ -1,5 +1,8 @@
 """Measured lengths and a measured tip against the model."""
 
+import numpy as np
+
+from controllers.actuation import PressureMap
 from controllers.arm import Arm
 from service.faults import FaultCode
 from service.monitors.monitor import Lasting, Seen, chamber
@@ -18,9 +21,7 @@ class ModelHolds:
     ) -> None:
         self._length_tolerance_m, self._tip_tolerance_m = length_tolerance_m, tip_tolerance_m
         self._lasting_s = lasting_s
-        self._rest_m = arm.rest_lengths_m.reshape(-1).tolist()
-        self._linear = arm.per_chamber("lengthening_m_per_pa").reshape(-1).tolist()
-        self._quadratic = arm.per_chamber("softening_m_per_pa2").reshape(-1).tolist()
+        self._pressure_map = PressureMap(arm)
         self._lasting = Lasting()
 
     def look(self, seen: Seen) -> str:
@@ -34,15 +35,13 @@ class ModelHolds:
         return what if self._lasting.longer(bool(what), seen.now_s, self._lasting_s) else ""
 
     def _length_that_is_off(self, seen: Seen) -> str:
-        for index, (length, pressure) in enumerate(
-            zip(seen.lengths_m, seen.measured_pa, strict=True)
-        ):
-            factor = self._linear[index] + self._quadratic[index] * abs(pressure)
-            off_m = abs(length - self._rest_m[index] - pressure * factor)
-            if off_m > self._length_tolerance_m:
-                allowed_mm = 1e3 * self._length_tolerance_m
+        pressures_pa = np.reshape(seen.measured_pa, (-1, 3))
+        models_m = self._pressure_map.lengths_m(pressures_pa).ravel().tolist()
+        for index, (length_m, model_m) in enumerate(zip(seen.lengths_m, models_m, strict=True)):
+            if abs(length_m - model_m) > self._length_tolerance_m:
+                length_mm, off_mm = 1e3 * length_m, 1e3 * abs(length_m - model_m)
                 return (
-                    f"{chamber(index)} measures {1e3 * length:.0f} mm, {1e3 * off_m:.0f} mm from "
-                    f"the model's length (allowed: {allowed_mm:g})"
+                    f"{chamber(index)} measures {length_mm:.0f} mm, {off_mm:.0f} mm from the "
+                    f"model's length (allowed: {1e3 * self._length_tolerance_m:g})"
                 )
         return ""

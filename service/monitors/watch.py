@@ -71,9 +71,12 @@ class Watch:
     ) -> dict[FaultCode, str]:
         """Return every fault that is there now, with what was seen.
 
-        ``sent_pa`` and ``estimated_m`` (n_sections, 3) are of the tick before.
+        ``sent_pa`` is what the device last acknowledged, ``estimated_m`` of the tick before, both
+        (n_sections, 3).
         """
-        measured, sent = measurement.pressures_pa.ravel().tolist(), sent_pa.ravel().tolist()
+        measured = measurement.pressures_pa.ravel().tolist()
+        # Before its first acknowledgement a device has not been told anything but zero.
+        sent = [value if value == value else 0.0 for value in sent_pa.ravel().tolist()]
         setpoints, taken_s = measurement.setpoints_pa, measurement.taken_s
         seen = Seen(
             now_s=now_s,

@@ -4,8 +4,10 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from controllers.arm import Section
-from service.tables.table import BAR, MM, Finite, Positive, Table
+from controllers.arm import UNCOUPLED, Arm, Response, Section
+from service.tables.table import BAR, DEG, MM, Finite, NotNegative, Positive, Table
+
+Row = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
 
 
 class SectionConfig(Table):
@@ -21,7 +23,11 @@ class SectionConfig(Table):
     pressure_max_bar: Annotated[float, Field(gt=0.0, le=10.0)]
     pressure_slew_max_bar_s: Positive
     lengthening_mm_per_bar: Positive
-    softening_mm_per_bar2: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    softening_mm_per_bar2: NotNegative = 0.0
+    coupling: Annotated[tuple[Row, Row, Row], Field(strict=False)] = UNCOUPLED
+    hysteresis_bar: NotNegative = 0.0
+    bending_compliance_deg_per_n_m: NotNegative = 0.0
+    axial_compliance_mm_per_n: NotNegative = 0.0
 
     @model_validator(mode="after")
     def _bounds_in_order(self) -> "SectionConfig":
@@ -40,13 +46,35 @@ class SectionConfig(Table):
             chamber_offset_m=self.chamber_offset_mm * MM,
             length_min_m=self.length_min_mm * MM,
             length_max_m=self.length_max_mm * MM,
-            bend_max_rad=self.bend_max_deg * 0.017453292519943295,
+            bend_max_rad=self.bend_max_deg * DEG,
             length_rate_max_m_s=self.length_rate_max_mm_s * MM,
             pressure_min_pa=self.pressure_min_bar * BAR,
             pressure_max_pa=self.pressure_max_bar * BAR,
             pressure_slew_max_pa_s=self.pressure_slew_max_bar_s * BAR,
             lengthening_m_per_pa=self.lengthening_mm_per_bar * MM / BAR,
             softening_m_per_pa2=self.softening_mm_per_bar2 * MM / BAR**2,
+            coupling=self.coupling,
+            hysteresis_pa=self.hysteresis_bar * BAR,
+            bending_compliance_rad_per_n_m=self.bending_compliance_deg_per_n_m * DEG,
+            axial_compliance_m_per_n=self.axial_compliance_mm_per_n * MM,
+        )
+
+
+class ResponseConfig(Table):
+    """How the arm answers to a step of the pressures."""
+
+    delay_ms: Annotated[float, Field(ge=0, le=500)] = 5.0
+    lag_ms: Annotated[float, Field(ge=0, le=5000)] = 60.0
+    mode_hz: Annotated[float, Field(gt=0, le=200)] = 2.2
+    damping_ratio: Annotated[float, Field(gt=0, le=2)] = 0.15
+
+    def response(self) -> Response:
+        """Return the response in SI units."""
+        return Response(
+            delay_s=self.delay_ms * 1e-3,
+            lag_s=self.lag_ms * 1e-3,
+            mode_hz=self.mode_hz,
+            damping_ratio=self.damping_ratio,
         )
 
 
@@ -56,3 +84,10 @@ class ArmConfig(Table):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
     gravity_m_s2: Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
     sections: Annotated[tuple[SectionConfig, ...], Field(min_length=1, max_length=16, strict=False)]
+    mass_kg: Positive = 1.0
+    response: ResponseConfig = ResponseConfig()
+
+    def build(self) -> Arm:
+        """Return the arm in SI units."""
+        sections = tuple(section.section() for section in self.sections)
+        return Arm(self.name, sections, self.gravity_m_s2, self.mass_kg, self.response.response())

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from service.tables.arm import ArmConfig
 from service.tables.table import BAR, Table
 
 
@@ -14,8 +15,10 @@ class HardwareConfig(Table):
     ``supply_flow_max_bar_s`` 0 means a supply without limit.
     """
 
-    adapter: Literal["simulator"] = "simulator"
+    adapter: Literal["simulator", "festo-cpx", "festo-vtem"] = "simulator"
     device: Annotated[str, Field(max_length=64, pattern=r"^[\x20-\x7e]*$")] = ""
+    exchange_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
+    accept_no_watchdog: bool = False
     supply_flow_max_bar_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
     @property
@@ -25,6 +28,11 @@ class HardwareConfig(Table):
 
 
 class SimulatorConfig(Table):
-    """The simulated arm: every parameter is drawn from the seed."""
+    """The simulated arm: every parameter is drawn from the seed.
+
+    ``arm`` is the arm that is simulated where it is not the one that the controller believes in:
+    a calibration changes the second, not the first.
+    """
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    arm: ArmConfig | None = None

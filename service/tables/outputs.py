@@ -26,6 +26,8 @@ class RerunConfig(Table):
     enabled: bool = True
     bind: str = "127.0.0.1"
     port: Annotated[int, Field(ge=1, le=65535)] = 9876
+    start_server: bool = True
+    recording: Annotated[str, Field(max_length=64, pattern=r"^[\x20-\x7e]*$")] = ""
     memory_limit_mib: Annotated[int, Field(ge=16, le=65536)] = 512
     open_viewer: bool = False
 

@@ -5,9 +5,10 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-MM, BAR = 1e-3, 1e5
+MM, BAR, DEG = 1e-3, 1e5, 0.017453292519943295
 
 
 class Table(BaseModel):

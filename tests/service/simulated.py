@@ -76,9 +76,11 @@ class Bench:
         preset: str = "paper",
         rate_hz: float = 500.0,
         seed: int = 0,
+        configuration: Configuration | None = None,
         supply_flow_max_bar_s: float = inf,
     ) -> None:
-        self.configuration = configuration_of(preset, rate_hz, seed)
+        self.configuration = configuration or configuration_of(preset, rate_hz, seed)
+        rate_hz = self.configuration.control.rate_hz
         self.arm = self.configuration.build_arm()
         self.hardware = Watched(backends.build(self.configuration, self.arm))
         self.events: list[pb.Event] = []

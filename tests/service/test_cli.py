@@ -43,6 +43,10 @@ COMMANDS = [
     ("_info", ["info", "x.mcap", "--json"]),
     ("_config", ["config", "show"]),
     ("_config", ["config", "check", "own.toml"]),
+    ("_doctor", ["doctor"]),
+    ("_doctor", ["doctor", "own.toml", "--json"]),
+    ("_systemd", ["systemd", "own.toml", "--user", "ada"]),
+    ("_systemd", ["systemd", "--arm", "trunk"]),
 ]
 
 

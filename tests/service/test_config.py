@@ -5,6 +5,7 @@ import os
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 from hypothesis import given
@@ -213,3 +214,39 @@ def test_addresses(tmp_path: Path) -> None:
     assert rerun_url(two) == "rerun+http://127.0.0.1:99/proxy"
     assert log_directory(loaded(tmp_path, "[log]\ndirectory = '~/x'")) == Path.home() / "x"
     assert log_directory(one).name == "sessions"
+
+
+def test_a_calibrated_section_and_response_become_si(tmp_path: Path) -> None:
+    calibrated = SECTION | {
+        "coupling": [[1.1, 0.0, 0.1], [0.0, 1.0, 0.0], [0.0, -0.1, 0.9]],
+        "hysteresis_bar": 0.03,
+        "bending_compliance_deg_per_n_m": 180.0,
+        "axial_compliance_mm_per_n": 2.0,
+    }
+    tables = {"arm": {"sections": [calibrated], "mass_kg": 0.4, "response": {"lag_ms": 80.0}}}
+    arm = loaded(tmp_path, tomli_w.dumps(tables)).build_arm()
+    section = arm.sections[0]
+    assert section.coupling[0] == (1.1, 0.0, 0.1)
+    assert section.hysteresis_pa == pytest.approx(3000.0)
+    assert section.bending_compliance_rad_per_n_m == pytest.approx(np.pi)
+    assert section.axial_compliance_m_per_n == pytest.approx(2e-3)
+    assert (arm.mass_kg, arm.response.lag_s, arm.response.delay_s) == (0.4, 0.08, 0.005)
+
+
+def test_a_coupling_without_an_inverse_is_refused(tmp_path: Path) -> None:
+    flat = SECTION | {"coupling": [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]}
+    (line,) = refusals(tmp_path, tomli_w.dumps({"arm": {"sections": [flat]}}))
+    assert line.startswith("arm: coupling = [[1.0, 0.0, 0.0], [1.0")
+    assert "rows must be independent" in line
+
+
+def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path) -> None:
+    real = load().model_dump(exclude_none=True)["arm"]
+    believed = real | {"sections": [SECTION | {"rest_length_mm": 210.0}]}
+    own = loaded(tmp_path, tomli_w.dumps({"arm": believed, "simulator": {"arm": real}}))
+    assert own.build_arm().sections[0].rest_length_m == pytest.approx(0.21)
+    assert own.build_simulated_arm() == load().build_arm()
+    assert loaded(tmp_path, own.to_toml()) == own
+    two = real | {"sections": [SECTION, SECTION]}
+    (line,) = refusals(tmp_path, tomli_w.dumps({"simulator": {"arm": two}}))
+    assert "simulator.arm has 2 sections, arm has 1" in line

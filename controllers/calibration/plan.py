@@ -1,0 +1,122 @@
+"""The motion of a calibration: every chamber alone, in pairs, all together, up and down, steps.
+
+A plan is a list of moves: ramp to some pressures, then rest there. Without vacuum the levels are
+those above zero only. The moves of several sections follow one another, with the other sections
+vented, and then all of them move together.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.arm import Arm, Array
+from controllers.kinematics.constant_curvature import shapes_from_lengths
+
+#: Largest share of the pressure range that is used.
+LARGEST_SHARE = 0.7
+RAMP_S = 0.7
+REST_S = 0.95
+STEP_REST_S = 2.2
+
+#: Of the largest bend of a section: what one chamber alone, or two, may bend it.
+_BEND_SHARE = 0.75
+
+
+@dataclass(frozen=True)
+class Move:
+    """Ramp to ``pressures_pa`` (n_sections, 3) in ``ramp_s``, smoothly; then rest for ``rest_s``.
+
+    A ``ramp_s`` of 0 is a step: as fast as the arm's limits allow.
+    """
+
+    pressures_pa: Array
+    ramp_s: float
+    rest_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the whole move."""
+        return self.ramp_s + self.rest_s
+
+    def at(self, start_pa: Array, elapsed_s: float) -> Array:
+        """Pressures some time after the move began at ``start_pa``: a minimum-jerk ramp."""
+        share = 1.0 if elapsed_s >= self.ramp_s else elapsed_s / self.ramp_s
+        smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        pressures: Array = start_pa + smooth * (self.pressures_pa - start_pa)
+        return pressures
+
+
+_ALONE = (0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0)
+_PAIR = (1.0, 0.4, -0.7)
+_ALL = (0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5)
+_MIXED = 12
+_STEPS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def plan(arm: Arm, seed: int = 0) -> list[Move]:
+    """Return the moves, from the vented arm back to it; the same for the same arm and seed."""
+    rng = np.random.default_rng(seed)
+    shares: list[Array] = []
+    for section in range(arm.n_sections):
+        for pattern in _section_patterns():
+            whole = np.zeros((arm.n_sections, 3))
+            whole[section] = pattern
+            shares.append(whole)
+    mixed = _MIXED if arm.n_sections == 1 else 2 * _MIXED * arm.n_sections
+    shares += list(rng.uniform(-0.9, 0.9, (mixed, arm.n_sections, 3)))
+    shares.append(np.zeros((arm.n_sections, 3)))
+    moves = [Move(_pressures(arm, share), RAMP_S, REST_S) for share in _possible(arm, shares)]
+    for step in _STEPS:
+        share = np.zeros((arm.n_sections, 3))
+        share[:] = step
+        moves.append(Move(_pressures(arm, 0.7 * share), 0.0, STEP_REST_S))
+    return moves
+
+
+def _section_patterns() -> list[Array]:
+    """Shares of the pressures of one section, one after the other."""
+    units = np.eye(3)
+    patterns = [level * units[chamber] for chamber in range(3) for level in _ALONE]
+    patterns += [level * (1.0 - units[chamber]) for chamber in range(3) for level in _PAIR]
+    patterns += [np.full(3, level) for level in _ALL]
+    return patterns
+
+
+def _possible(arm: Arm, shares: list[Array]) -> list[Array]:
+    """Leave out what an arm without vacuum cannot do, and what would repeat the move before."""
+    vacuum = arm.per_chamber("pressure_min_pa") < 0.0
+    kept: list[Array] = []
+    last = np.zeros((arm.n_sections, 3))
+    for share in shares:
+        possible = np.where(vacuum, share, np.abs(share))
+        if not vacuum.any() and (share <= 0.0).all() and (share < 0.0).any():
+            continue
+        if not np.array_equal(possible, last) or not kept:
+            kept.append(possible)
+        last = possible
+    return kept
+
+
+def _pressures(arm: Arm, share: Array) -> Array:
+    """Gauge pressures (n_sections, 3) for shares -1 to 1 of the range that is used."""
+    high = LARGEST_SHARE * arm.per_chamber("pressure_max_pa")
+    low = -LARGEST_SHARE * arm.per_chamber("pressure_min_pa")
+    pressures: Array = np.where(share >= 0.0, share * high, share * low)
+    return pressures * _bend_factor(arm, pressures)
+
+
+def _bend_factor(arm: Arm, pressures_pa: Array) -> Array:
+    """Factor (n_sections, 1) that keeps the bend of every section well inside its limit."""
+    linear = arm.per_chamber("lengthening_m_per_pa")
+    curve = linear + arm.per_chamber("softening_m_per_pa2") * np.abs(pressures_pa)
+    lengths = arm.rest_lengths_m + curve * pressures_pa
+    shapes = shapes_from_lengths(lengths, arm.per_section("chamber_offset_m"))
+    bend = np.hypot(shapes[:, 1], shapes[:, 2])[:, None]
+    allowed = _BEND_SHARE * arm.per_section("bend_max_rad")
+    factor: Array = np.minimum(1.0, allowed / np.maximum(bend, 1e-9))
+    return factor
+
+
+def duration_s(moves: list[Move]) -> float:
+    """Time of a whole plan."""
+    return sum(move.duration_s for move in moves)

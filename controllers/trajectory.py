@@ -1,0 +1,136 @@
+"""The smooth reference between targets: a point that goes to a goal within its limits.
+
+Time-optimal in each axis by Ruckig (Berscheid and Kroeger, "Jerk-limited real-time trajectory
+generation with arbitrary target states", 2021). A new goal makes one plan, which meets the goal
+where it will be; from then on the reference is the goal, so a goal that keeps the limits itself
+is followed exactly.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ruckig import InputParameter, Ruckig, RuckigError, Synchronization, Trajectory
+
+#: What a goal may ask of the limits: at the limits themselves rounding makes Ruckig refuse.
+_SHARE = 0.98
+
+#: A moving goal is met this much later than time-optimally, so that there is a time to agree on.
+_SLACK = 1.02
+
+#: Tries to agree on the time, and what counts as agreed (s).
+_TRIES = 12
+_AGREED_S = 1e-9
+
+
+@dataclass(frozen=True)
+class ReferenceLimits:
+    """How fast (m/s), how hard (m/s^2) and how suddenly (m/s^3) the reference may move."""
+
+    speed_m_s: float = 0.4
+    acceleration_m_s2: float = 4.0
+    jerk_m_s3: float = 80.0
+
+
+class Motion(NamedTuple):
+    """Position, velocity and acceleration of a point, plain lists of n numbers."""
+
+    position: list[float]
+    velocity: list[float]
+    acceleration: list[float]
+
+
+#: Where a goal is so many seconds from now.
+Goal = Callable[[float], Motion]
+
+
+class Reference:
+    """A point (n,) with velocity and acceleration; n is 3, or 6 with a rotation vector.
+
+    The limits hold for the norm of the first three coordinates, and of the last three with the
+    limits of the turn: an axis gets 1/sqrt(3) of them, so no direction exceeds them.
+    """
+
+    def __init__(self, limits: ReferenceLimits, turn: ReferenceLimits | None = None) -> None:
+        axes = [limits] * 3 + ([] if turn is None else [turn] * 3)
+        self.size, share = len(axes), 3.0**-0.5
+        self._speed = [_SHARE * share * axis.speed_m_s for axis in axes]
+        self._acceleration = [_SHARE * share * axis.acceleration_m_s2 for axis in axes]
+        self._otg, self._input = Ruckig(self.size), InputParameter(self.size)
+        self._input.max_velocity = [share * axis.speed_m_s for axis in axes]
+        self._input.max_acceleration = [share * axis.acceleration_m_s2 for axis in axes]
+        self._input.max_jerk = [share * axis.jerk_m_s3 for axis in axes]
+        self._input.synchronization = Synchronization.Phase
+        self.error = ""
+        self.start([0.0] * self.size)
+
+    def start(
+        self,
+        position: list[float],
+        velocity: list[float] | None = None,
+        acceleration: list[float] | None = None,
+    ) -> None:
+        """Be at a position, moving or not, with nowhere to go yet but to rest there."""
+        zeros = [0.0] * self.size
+        moving = _clipped(velocity or zeros, self._speed)
+        self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration))
+        self._goal = standing(position)
+        self._plan: Trajectory | None = None
+        self._since_s = 0.0
+        if any(moving):
+            self.go(self._goal)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the reference has met its goal."""
+        return self._plan is None
+
+    def go(self, goal: Goal) -> None:
+        """Go to a goal from here; one that cannot be planned for is not taken: see ``error``."""
+        zeros = [0.0] * self.size
+        now = self.now
+        request = self._input
+        request.current_position, request.current_velocity = now.position, now.velocity
+        request.current_acceleration = _clipped(now.acceleration, self._acceleration)
+        plan, at_s = Trajectory(self.size), 0.0
+        request.minimum_duration = None
+        self.error = ""
+        for _ in range(_TRIES):
+            aim = goal(at_s)
+            request.target_position = aim.position
+            request.target_velocity = _clipped(aim.velocity, self._speed)
+            request.target_acceleration = _clipped(aim.acceleration, self._acceleration)
+            try:
+                self._otg.calculate(request, plan)
+            except RuckigError as error:
+                self.error = " ".join(str(error).split())
+                return
+            if abs(plan.duration - at_s) < _AGREED_S:
+                break
+            at_s = plan.duration if aim.velocity == zeros else _SLACK * plan.duration
+            request.minimum_duration = at_s
+        self._plan, self._since_s, self._goal = plan, 0.0, goal
+
+    def step(self, dt_s: float) -> Motion:
+        """Move on by one tick; return where the reference is then.
+
+        The goal's own time began when it was given to :meth:`go`.
+        """
+        self._since_s += dt_s
+        if self._plan is not None and self._since_s < self._plan.duration:
+            self.now = Motion(*self._plan.at_time(self._since_s))
+        else:
+            self._plan = None
+            self.now = self._goal(self._since_s)
+        return self.now
+
+
+def _clipped(values: list[float], limits: list[float]) -> list[float]:
+    return [min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)]
+
+
+def standing(position: list[float]) -> Goal:
+    """Return a goal that does not move."""
+    zeros = [0.0] * len(position)
+    motion = Motion(position, zeros, zeros)
+    return lambda ahead_s: motion

@@ -1,0 +1,1 @@
+"""The Ctrl-P pressure controller, over USB serial."""

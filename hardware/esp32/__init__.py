@@ -1,0 +1,1 @@
+"""The ESP32 controller of three chambers, over USB serial."""

@@ -1,0 +1,1 @@
+"""Festo CPX terminals with VPPM proportional pressure valves, over Modbus TCP."""

@@ -1,0 +1,140 @@
+"""VPPM valves on a CPX terminal behind the interface of every device."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.arm import Arm, Array
+from controllers.errors import HardwareError
+from hardware.checked import checked_command
+from hardware.festo_cpx.protocol import (
+    CpxInputs,
+    CpxLayout,
+    complaint,
+    counts_of,
+    pressures_of,
+)
+from hardware.interface import Measurement
+from hardware.modbus import ModbusTerminal
+from hardware.terminal_watchdog import TerminalWatchdog
+
+#: The terminal shows a setpoint some of its cycles late: one of these last writes must be it.
+_REMEMBERED_WRITES = 8
+_MISMATCHES = 3
+#: A valve may round what it was told by this many counts.
+_ROUNDED = 2
+
+NAME = "festo_cpx"
+
+
+@dataclass(frozen=True)
+class CpxSettings:
+    """Where the terminal is, and what is wired to it."""
+
+    host: str
+    port: int
+    unit_id: int
+    timeout_s: float
+    layout: CpxLayout
+    watchdog: TerminalWatchdog
+
+
+class FestoCpx:
+    """One arm on a CPX terminal. It satisfies :class:`hardware.interface.Hardware`; I/O blocks."""
+
+    def __init__(self, arm: Arm, settings: CpxSettings) -> None:
+        self._arm, self._settings = arm, settings
+        self._low_pa = arm.per_chamber("pressure_min_pa")
+        self._high_pa = arm.per_chamber("pressure_max_pa")
+        self._terminal = ModbusTerminal(
+            NAME, settings.host, settings.port, settings.unit_id, settings.timeout_s
+        )
+        self._written: deque[list[int]] = deque(maxlen=_REMEMBERED_WRITES)
+        self._mismatches = 0
+        self.has_watchdog = settings.watchdog.timeout_ms > 0
+
+    def connect(self) -> None:
+        """Open the connection, zero every output, set the terminal's watchdog, read once."""
+        self._terminal.connect()
+        self._written.clear()
+        self._mismatches = 0
+        try:
+            self._write_counts([0] * self._arm.n_chambers)
+            self._settings.watchdog.set_on(self._terminal, NAME)
+            self._read_inputs()
+        except HardwareError:
+            self._terminal.close()
+            raise
+
+    def read(self, time_s: float) -> Measurement:
+        """Return what the valves say, in one block; raises HardwareError for a foreign setpoint."""
+        inputs = self._read_inputs()
+        self._check_setpoints(inputs)
+        n_sections = self._arm.n_sections
+        valves = self._settings.layout.valves
+        found = zip(valves, inputs.diagnosis, strict=True)
+        return Measurement(
+            pressures_pa=pressures_of(inputs.actual, n_sections),
+            lengths_m=np.full((n_sections, 3), np.nan),
+            setpoints_pa=pressures_of(inputs.setpoint, n_sections),
+            complaints=tuple(complaint(valve, word) for valve, word in found if word),
+        )
+
+    def write(self, pressures_pa: Array, time_s: float) -> Array:
+        """Set gauge pressures (n_sections, 3); return them in whole millibars, as sent.
+
+        Rounded toward ambient, and never outside the arm's limits: where these allow no vacuum no
+        negative value is ever sent.
+        """
+        taken_pa = checked_command(pressures_pa, self._low_pa, self._high_pa, NAME)
+        counts = counts_of(taken_pa)
+        self._write_counts(counts)
+        return pressures_of(counts, self._arm.n_sections)
+
+    def vent(self, time_s: float) -> None:
+        """Set every output to zero."""
+        self._write_counts([0] * self._arm.n_chambers)
+
+    def close(self) -> None:
+        """Zero every output where that is still possible, and let the terminal go."""
+        if self._terminal.connected:
+            try:
+                self._write_counts([0] * self._arm.n_chambers)
+            except HardwareError:
+                pass  # it is gone: its watchdog has to do it
+            finally:
+                self._terminal.close()
+
+    def _write_counts(self, counts: list[int]) -> None:
+        self._written.append(counts)  # before: a write without an answer may have arrived
+        for address, registers in self._settings.layout.output_blocks(counts):
+            self._terminal.write(address, registers)
+
+    def _read_inputs(self) -> CpxInputs:
+        layout = self._settings.layout
+        try:
+            return layout.decode(self._terminal.read(*layout.input_block))
+        except HardwareError as error:
+            if "exception 2" not in str(error):
+                raise
+            raise HardwareError(
+                f"{error}: does the terminal have {len(layout.valves)} valves at "
+                f"{NAME}.input_base = {layout.input_base}, one for every chamber?"
+            ) from error
+
+    def _check_setpoints(self, inputs: CpxInputs) -> None:
+        """Raise where the terminal has long shown a setpoint that none of our writes was."""
+        foreign = [
+            index
+            for index, shown in enumerate(inputs.setpoint)
+            if all(abs(shown - counts[index]) > _ROUNDED for counts in self._written)
+        ]
+        self._mismatches = self._mismatches + 1 if foreign else 0
+        if self._mismatches >= _MISMATCHES:
+            index = foreign[0]
+            raise HardwareError(
+                f"{NAME}: valve {self._settings.layout.valves[index]} holds the setpoint "
+                f"{inputs.setpoint[index]} mbar, but {self._written[-1][index]} mbar was written; "
+                "its watchdog has run out, or another program writes to the terminal"
+            )

@@ -1,0 +1,87 @@
+"""An emulated CPX terminal: registers in front of an emulated arm."""
+
+import numpy as np
+
+from hardware.emulated_watchdog import EmulatedWatchdog
+from hardware.emulation import EmulatedArm
+from hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
+from hardware.modbus import from_signed, milliseconds_to_registers, to_signed
+from hardware.terminal_watchdog import TerminalWatchdog
+
+#: The terminal's first valve is fed by this much at most, counts of 1 mbar.
+_LARGEST_COUNT = 10_000
+
+
+class EmulatedCpx:
+    """A terminal with ``n_valves`` valves; those of the layout move the chambers."""
+
+    def __init__(
+        self,
+        arm: EmulatedArm,
+        layout: CpxLayout,
+        watchdog: TerminalWatchdog,
+        hold: bool = False,
+        n_valves: int | None = None,
+    ) -> None:
+        self._arm, self._layout, self._where = arm, layout, watchdog
+        self._watchdog = EmulatedWatchdog(arm, watchdog.timeout_ms, hold)
+        n_valves = max(layout.valves) + 1 if n_valves is None else n_valves
+        self._counts = [0] * n_valves
+        self._failsafe = int(hold)
+
+    def touched(self, now_s: float) -> None:
+        """Somebody has asked for something."""
+        self._watchdog.touched(now_s)
+
+    def step(self, now_s: float) -> None:
+        """Let the air move and the watchdog run."""
+        self._arm.advance(now_s)
+        if self._watchdog.step(now_s):
+            self._counts = [0] * len(self._counts)
+
+    def read(self, address: int, count: int) -> list[int] | None:
+        """Return registers, None where one of them is not there."""
+        found = self._registers()
+        wanted = range(address, address + count)
+        if not all(number in found for number in wanted):
+            return None
+        return [from_signed(found[number]) for number in wanted]
+
+    def _registers(self) -> dict[int, int]:
+        layout, where = self._layout, self._where
+        found: dict[int, int] = {}
+        for valve, count in enumerate(self._counts):
+            found[layout.output_base + layout.output_stride * valve] = count
+            first = layout.input_base + layout.input_stride * valve
+            found |= {first: self._actual(valve), first + 1: count, first + 2: 0}
+        registers = milliseconds_to_registers(self._watchdog.timeout_ms, where.words)
+        found |= {where.register + index: word for index, word in enumerate(registers)}
+        if where.failsafe_register is not None:
+            found[where.failsafe_register] = self._failsafe
+        return found
+
+    def _actual(self, valve: int) -> int:
+        """Measured counts; what is no number reads as the lowest, as of a broken sensor."""
+        if valve not in self._layout.valves:
+            return 0
+        measured_pa = self._arm.pressures_pa.reshape(-1)[self._layout.valves.index(valve)]
+        return -32768 if np.isnan(measured_pa) else round(float(measured_pa) / COUNT_PA)
+
+    def write(self, address: int, values: list[int], now_s: float) -> bool:
+        """Take setpoints, or the watchdog's time; False where a register is not there."""
+        where, layout = self._where, self._layout
+        if address == where.register and len(values) == where.words:
+            self._watchdog.timeout_ms = sum(v << (16 * i) for i, v in enumerate(values))
+            return True
+        outputs = {
+            layout.output_base + layout.output_stride * valve: valve
+            for valve in range(len(self._counts))
+        }
+        wanted = range(address, address + len(values))
+        if not all(number in outputs for number in wanted):
+            return False
+        for number, value in zip(wanted, values, strict=True):
+            self._counts[outputs[number]] = min(to_signed(value), _LARGEST_COUNT)
+        counts = np.array([self._counts[valve] for valve in layout.valves])
+        self._arm.set_pressures_pa(counts * COUNT_PA, now_s)
+        return True

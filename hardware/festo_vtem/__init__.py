@@ -1,0 +1,1 @@
+"""Festo VTEM motion terminals, over Modbus TCP."""

@@ -1,0 +1,131 @@
+"""An emulated VTEM: slots with apps in front of an emulated arm."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware.emulated_watchdog import EmulatedWatchdog
+from hardware.emulation import EmulatedArm
+from hardware.festo_cpx.protocol import COUNT_PA
+from hardware.festo_vtem.protocol import (
+    ACKNOWLEDGE_COMMAND,
+    IDLE,
+    OFF,
+    OFF_COMMAND,
+    PRESSURE_REGULATION,
+    REGULATE_COMMAND,
+    REGULATING,
+    VtemLayout,
+    command_word,
+)
+from hardware.modbus import from_signed, milliseconds_to_registers, to_signed
+from hardware.terminal_watchdog import TerminalWatchdog
+
+#: How long a slot takes to load pressure regulation.
+_LOAD_S = 0.3
+
+
+@dataclass
+class _Slot:
+    """It regulates only after it was acknowledged, and then asked for the app."""
+
+    app: int = OFF
+    state: int = IDLE
+    acknowledged: bool = False
+    loading_until_s: float | None = None
+    counts: tuple[int, int] = (0, 0)
+
+    def command(self, word: int, counts: tuple[int, int], now_s: float) -> None:
+        self.counts = counts
+        if word == ACKNOWLEDGE_COMMAND:
+            self.acknowledged = True
+        elif word == OFF_COMMAND:
+            self.app, self.state, self.acknowledged = OFF, IDLE, False
+            self.loading_until_s = None
+        elif word == REGULATE_COMMAND and self.app == OFF and self.acknowledged:
+            if self.loading_until_s is None:
+                self.loading_until_s = now_s + _LOAD_S
+            elif now_s > self.loading_until_s:
+                self.app, self.state = PRESSURE_REGULATION, REGULATING
+
+    @property
+    def regulated(self) -> tuple[int, int]:
+        """The counts it regulates to: none while the app does not run."""
+        return self.counts if self.app == PRESSURE_REGULATION else (0, 0)
+
+
+class EmulatedVtem:
+    """A motion terminal with as many slots as the layout needs."""
+
+    def __init__(
+        self,
+        arm: EmulatedArm,
+        layout: VtemLayout,
+        watchdog: TerminalWatchdog,
+        hold: bool = False,
+        n_slots: int | None = None,
+    ) -> None:
+        self._arm, self._layout, self._where = arm, layout, watchdog
+        self._watchdog = EmulatedWatchdog(arm, watchdog.timeout_ms, hold)
+        self._slots = [_Slot() for _ in range(n_slots or layout.slots[-1] + 1)]
+        self._failsafe = int(hold)
+
+    def touched(self, now_s: float) -> None:
+        """Somebody has asked for something."""
+        self._watchdog.touched(now_s)
+
+    def step(self, now_s: float) -> None:
+        """Let the air move and the watchdog run."""
+        self._arm.advance(now_s)
+        if self._watchdog.step(now_s):
+            for slot in self._slots:
+                slot.counts = (0, 0)
+
+    def read(self, address: int, count: int) -> list[int] | None:
+        """Return registers, None where one of them is not there."""
+        found, where = self._inputs(), self._where
+        registers = milliseconds_to_registers(self._watchdog.timeout_ms, where.words)
+        found |= {where.register + index: word for index, word in enumerate(registers)}
+        if where.failsafe_register is not None:
+            found[where.failsafe_register] = self._failsafe
+        wanted = range(address, address + count)
+        if not all(number in found for number in wanted):
+            return None
+        return [from_signed(found[number]) for number in wanted]
+
+    def _inputs(self) -> dict[int, int]:
+        layout, found = self._layout, {}
+        for number, slot in enumerate(self._slots):
+            first = layout.input_base + layout.input_stride * number
+            found[first] = command_word(slot.app, slot.state)
+            found[first + 1], found[first + 2] = (
+                self._actual(2 * number),
+                self._actual(2 * number + 1),
+            )
+        return found
+
+    def _actual(self, valve: int) -> int:
+        if valve not in self._layout.valves:
+            return 0
+        measured_pa = self._arm.pressures_pa.reshape(-1)[self._layout.valves.index(valve)]
+        return -32768 if np.isnan(measured_pa) else round(float(measured_pa) / COUNT_PA)
+
+    def write(self, address: int, values: list[int], now_s: float) -> bool:
+        """Take whole slots, or the watchdog's time; False for anything else."""
+        where, layout = self._where, self._layout
+        if address == where.register and len(values) == where.words:
+            self._watchdog.timeout_ms = sum(v << (16 * i) for i, v in enumerate(values))
+            return True
+        first, rest = divmod(address - layout.output_base, layout.output_stride)
+        count, odd = divmod(len(values), layout.output_stride)
+        if rest or odd or not 0 <= first <= first + count <= len(self._slots):
+            return False
+        for index in range(count):
+            word, one, two, *_ = values[layout.output_stride * index :]
+            self._slots[first + index].command(word, (to_signed(one), to_signed(two)), now_s)
+        self._regulate(now_s)
+        return True
+
+    def _regulate(self, now_s: float) -> None:
+        counts = [self._slots[valve // 2].regulated[valve % 2] for valve in self._layout.valves]
+        self._arm.set_pressures_pa(np.array(counts) * COUNT_PA, now_s)

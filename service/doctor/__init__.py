@@ -1,0 +1,1 @@
+"""Is this PC ready: one finding a check, with what to change."""

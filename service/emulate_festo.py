@@ -1,0 +1,120 @@
+"""Emulated Festo terminals: CPX and VTEM behind Modbus TCP on loopback."""
+
+import argparse
+import asyncio
+import signal
+import time
+from dataclasses import replace
+
+from controllers.errors import ConfigurationError, InvalidInput
+from hardware.emulation import DeviceRecord, EmulatedArm
+from hardware.festo_cpx.emulator import EmulatedCpx
+from hardware.festo_vtem.emulator import EmulatedVtem
+from hardware.modbus_server import EmulatedTerminal, ModbusServer
+from hardware.terminal_watchdog import TerminalWatchdog
+from hardware.transport_faults import ALL_WORDS, TransportFaults, start_console
+from service import festo
+from service.config import Configuration
+from service.tables.festo import FestoConfig
+
+_HOST = "127.0.0.1"
+
+
+def cpx(arguments: argparse.Namespace, configuration: Configuration) -> int:
+    """Emulate a CPX terminal."""
+    table, arm = configuration.festo_cpx, configuration.build_arm()
+    emulated = _arm(arguments, configuration)
+    where = festo.cpx_layout(table, arm)
+    hold = arguments.fail_safe == "hold"
+    terminal = EmulatedCpx(emulated, where, _watchdog(arguments, table), hold)
+    return _serve("festo-cpx", arguments, configuration, terminal, emulated)
+
+
+def vtem(arguments: argparse.Namespace, configuration: Configuration) -> int:
+    """Emulate a VTEM."""
+    table, arm = configuration.festo_vtem, configuration.build_arm()
+    emulated = _arm(arguments, configuration)
+    where = festo.vtem_layout(table, arm)
+    hold = arguments.fail_safe == "hold"
+    terminal = EmulatedVtem(emulated, where, _watchdog(arguments, table), hold)
+    return _serve("festo-vtem", arguments, configuration, terminal, emulated)
+
+
+def _arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
+    try:
+        record = None if arguments.record is None else DeviceRecord(arguments.record)
+    except OSError as error:
+        raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
+    return EmulatedArm(configuration.build_arm(), arguments.seed, record)
+
+
+def _watchdog(arguments: argparse.Namespace, table: FestoConfig) -> TerminalWatchdog:
+    where = festo.watchdog(table)
+    if arguments.watchdog_ms is None:
+        return where
+    return replace(where, timeout_ms=arguments.watchdog_ms)
+
+
+def _serve(
+    name: str,
+    arguments: argparse.Namespace,
+    configuration: Configuration,
+    terminal: EmulatedTerminal,
+    arm: EmulatedArm,
+) -> int:
+    faults = TransportFaults()
+    with asyncio.Runner() as runner:
+        try:
+            runner.run(
+                _run(name, arguments, configuration, ModbusServer(terminal, faults), (arm, faults))
+            )
+        except asyncio.CancelledError:
+            pass
+        except OSError as error:
+            raise ConfigurationError(
+                f"--port {arguments.port}: cannot listen on {_HOST} ({error.strerror}); choose "
+                "another port, or 0 for a free one"
+            ) from error
+    return 0
+
+
+async def _run(
+    name: str,
+    arguments: argparse.Namespace,
+    configuration: Configuration,
+    server: ModbusServer,
+    parts: tuple[EmulatedArm, TransportFaults],
+) -> None:
+    loop = asyncio.get_running_loop()
+    ready: asyncio.Future[int] = loop.create_future()
+    task = loop.create_task(server.run(_HOST, arguments.port, ready))
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, task.cancel)
+    await asyncio.wait((task, ready), return_when=asyncio.FIRST_COMPLETED)
+    if ready.done():
+        arm, faults = parts
+        print(_configuration_lines(name, configuration, ready.result()), flush=True)
+        start_console(arm.inject, faults, time.monotonic)
+    await task
+
+
+def _configuration_lines(name: str, configuration: Configuration, port: int) -> str:
+    """Return the lines that make a daemon use this emulator, as they stand."""
+    table = name.replace("-", "_")
+    vacuum = any(section.pressure_min_bar < 0.0 for section in configuration.arm.sections)
+    largest = max(section.pressure_max_bar for section in configuration.arm.sections)
+    lines = [
+        f"# {name} with the arm {configuration.arm.name}; use it with these lines:",
+        f'preset = "{configuration.preset}"',
+        "[hardware]",
+        f'adapter = "{name}"',
+        f"[{table}]",
+        f'host = "{_HOST}"',
+        f"port = {port}",
+    ]
+    if vacuum:
+        lines.append('valve_range = "vacuum"')
+    if largest > 1.2:
+        lines.append(f"ceiling_bar = {largest:g}")
+    lines.append(f"# faults, a line each on stdin: {', '.join(ALL_WORDS)}")
+    return "\n".join(lines)
