@@ -173,8 +173,7 @@ def _fit_mode(
             columns = np.column_stack([modelled, np.ones_like(modelled)])
             gain, offset = np.linalg.lstsq(columns, measured, rcond=None)[0]
             time_s: Array = STEP_S * np.arange(len(measured), dtype=np.float64)
-            fitted: Array = gain * modelled + offset
-            found.append(StepAnswer(time_s, measured, fitted))
+            found.append(StepAnswer(time_s, measured, np.asarray(gain * modelled + offset)))
         return found
 
     def rows(x: Array) -> Array:
