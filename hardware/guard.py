@@ -1,4 +1,4 @@
-"""The last check before any device: range, slew, finiteness and age of a command.
+"""The last check before any device: range, slew, supply, finiteness and age of a command.
 
 It knows the arm's limits and nothing of the controller, and imports only the arm and the errors,
 so that no mistake upstream can reach the air.
@@ -6,6 +6,7 @@ so that no mistake upstream can reach the air.
 
 from dataclasses import dataclass
 from enum import IntFlag
+from math import inf
 
 import numpy as np
 
@@ -20,6 +21,7 @@ class Intervention(IntFlag):
     SLEW = 2
     NOT_FINITE = 4
     TOO_OLD = 8
+    SUPPLY = 16
 
 
 @dataclass(frozen=True)
@@ -34,17 +36,19 @@ class Guard:
     """Turns any command into one that is allowed now.
 
     The slew counts from the last write that the device acknowledged, :meth:`acknowledge`. Venting
-    goes past the guard: it is always allowed, at any speed.
+    goes past the guard: it is always allowed, at any speed. ``supply_flow_max_pa_s`` limits the
+    sum of all rises in a second, for a supply that cannot feed every chamber at full slew.
     """
 
     #: A command older than this many periods, or than this time, whichever is longer, is void.
     MAX_AGE_PERIODS = 3.0
     MAX_AGE_S = 0.05
 
-    def __init__(self, arm: Arm, period_s: float) -> None:
+    def __init__(self, arm: Arm, period_s: float, supply_flow_max_pa_s: float = inf) -> None:
         self._low = arm.per_chamber("pressure_min_pa")
         self._high = arm.per_chamber("pressure_max_pa")
         self._slew = arm.per_chamber("pressure_slew_max_pa_s")
+        self._flow_max_pa_s = supply_flow_max_pa_s
         self._max_age_s = max(self.MAX_AGE_PERIODS * period_s, self.MAX_AGE_S)
         self._period_s = period_s
         self._sent = np.zeros_like(self._low)
@@ -59,30 +63,34 @@ class Guard:
         too_old = not 0.0 <= now_s - commanded_at_s <= self._max_age_s
         if too_old or pressures_pa.shape != self._low.shape:
             return Guarded(np.zeros_like(self._low), Intervention.TOO_OLD)
-        largest = self._slew * self._elapsed_s(now_s)
-        low, high = self._sent - largest, self._sent + largest
-        allowed = np.minimum(np.maximum(pressures_pa, low), high)
-        # Range last, because a device may have acknowledged a little more than the range.
-        allowed = np.minimum(np.maximum(allowed, self._low), self._high)
-        if (allowed == pressures_pa).all():  # never true of a NaN
-            return Guarded(allowed, Intervention.NOTHING)
-        return self._changed(pressures_pa, low, high)
+        finite = np.where(np.isfinite(pressures_pa), pressures_pa, self._sent)
+        in_range = self._in_range(finite)
+        slewed = self._slewed(in_range, now_s)
+        supplied = self._supplied(slewed, now_s)
+        if (supplied == pressures_pa).all():  # never true of a NaN
+            return Guarded(supplied, Intervention.NOTHING)
+        stages = (pressures_pa, finite, in_range, slewed, supplied)
+        return Guarded(supplied, _why(stages))
 
-    def _changed(self, wanted: Array, low: Array, high: Array) -> Guarded:
-        """Return what may be sent instead of a command that may not, and why; slew low to high."""
-        intervention = Intervention.NOTHING
-        finite = np.isfinite(wanted)
-        if not finite.all():
-            wanted = np.where(finite, wanted, self._sent)
-            intervention |= Intervention.NOT_FINITE
-        in_range = np.minimum(np.maximum(wanted, self._low), self._high)
-        if (in_range != wanted).any():
-            intervention |= Intervention.RANGE
-        slewed = np.minimum(np.maximum(in_range, low), high)
-        slewed = np.minimum(np.maximum(slewed, self._low), self._high)
-        if (slewed != in_range).any():
-            intervention |= Intervention.SLEW
-        return Guarded(slewed, intervention)
+    def _in_range(self, pressures_pa: Array) -> Array:
+        return np.minimum(np.maximum(pressures_pa, self._low), self._high)
+
+    def _slewed(self, wanted: Array, now_s: float) -> Array:
+        """Go no further from the last acknowledged write than the slew allows by now."""
+        largest = self._slew * self._elapsed_s(now_s)
+        slewed = np.minimum(np.maximum(wanted, self._sent - largest), self._sent + largest)
+        # Range once more, because a device may have acknowledged a little more than the range.
+        return self._in_range(slewed)
+
+    def _supplied(self, wanted: Array, now_s: float) -> Array:
+        """Shorten all rises by one factor, so that every chamber goes on, and falls not at all."""
+        if self._flow_max_pa_s == inf:  # the usual case, without its cost
+            return wanted
+        rises = np.maximum(wanted - self._sent, 0.0)
+        largest, needed = self._flow_max_pa_s * self._elapsed_s(now_s), float(rises.sum())
+        if not needed > largest:
+            return wanted
+        return self._in_range(wanted - rises * (1.0 - largest / needed))
 
     def _elapsed_s(self, now_s: float) -> float:
         """Time since the last acknowledged write; one period before the first."""
@@ -97,3 +105,16 @@ class Guard:
         """
         self._sent = np.where(np.isfinite(pressures_pa), pressures_pa, self._sent)
         self._sent_at_s = at_s
+
+
+#: What each stage of a check may change, in their order.
+_STAGES = (Intervention.NOT_FINITE, Intervention.RANGE, Intervention.SLEW, Intervention.SUPPLY)
+
+
+def _why(stages: tuple[Array, ...]) -> Intervention:
+    """Return the stages that changed something; NaN differs from everything."""
+    intervention = Intervention.NOTHING
+    for kind, before, after in zip(_STAGES, stages, stages[1:], strict=False):
+        if (before != after).any():
+            intervention |= kind
+    return intervention

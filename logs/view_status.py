@@ -6,7 +6,7 @@ from controllers.arm import Array
 from logs.schema import pneuarm_pb2 as pb
 
 _BINDING = {1: "length", 2: "bend", 4: "pressure"}
-_GUARD = {1: "range", 2: "slew", 4: "not finite", 8: "too old"}
+_GUARD = {1: "range", 2: "slew", 4: "not finite", 8: "too old", 16: "supply"}
 
 
 def status_markdown(tick: np.void) -> str:

@@ -22,6 +22,7 @@ from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
 from service.tables.festo import FestoCpxConfig, FestoVtemConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
+from service.tables.monitors import MonitorsConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
 from service.tables.serial import CtrlPConfig, Esp32Config, ReplayConfig
 from service.tables.table import Table
@@ -36,6 +37,7 @@ class Configuration(Table):
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
     hardware: HardwareConfig = HardwareConfig()
+    monitors: MonitorsConfig = MonitorsConfig()
     simulator: SimulatorConfig = SimulatorConfig()
     festo_cpx: FestoCpxConfig = FestoCpxConfig()
     festo_vtem: FestoVtemConfig = FestoVtemConfig()

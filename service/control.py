@@ -52,6 +52,8 @@ class ControlProcess:
                 hold_s=control.hold_timeout_s,
                 full_disk_vent_s=configuration.log.full_disk_vent_s,
             ),
+            monitors=configuration.monitors.settings(),
+            supply_flow_max_pa_s=configuration.hardware.supply_flow_limit_pa_s,
             start_ns=shared.start_ns,
             start_unix_ns=shared.start_unix_ns,
         )

@@ -31,7 +31,7 @@ class DeviceProcess:
     def __init__(self, configuration: Configuration, link: DeviceLink, end: Connection) -> None:
         arm = configuration.build_arm()
         period_s = 1.0 / configuration.control.rate_hz
-        guard = Guard(arm, period_s)
+        guard = Guard(arm, period_s, configuration.hardware.supply_flow_limit_pa_s)
         self._device = GuardedDevice(backends.build(configuration, arm), guard, arm.n_sections)
         self._link = DeviceEnd(link)
         self._max_age_s = max(Guard.MAX_AGE_PERIODS * period_s, Guard.MAX_AGE_S)

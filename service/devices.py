@@ -30,11 +30,10 @@ def tcp_address(configuration: Configuration) -> tuple[str, int] | None:
 
 
 def _tables(configuration: Configuration) -> list[dict[str, Any]]:
-    """Return the adapter's own table, or that of its family, if there is one, and `hardware`."""
+    """Return the adapter's own table, if it has one, and `hardware`."""
     tables = configuration.model_dump()
-    adapter: str = configuration.hardware.adapter
-    names = [name for name in tables if adapter.startswith(name) and name != "hardware"]
-    return [tables[name] for name in (*names, "hardware") if isinstance(tables[name], dict)]
+    own = configuration.hardware.adapter.replace("-", "_")
+    return [tables[name] for name in (own, "hardware") if isinstance(tables.get(name), dict)]
 
 
 def _texts(tables: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:

@@ -40,11 +40,11 @@ from service.publisher import Publisher
 _PERIOD_S = 0.01
 _HEARTBEAT_S = 0.05
 
-#: A stop without control's answer for so long is repeated; control answers in its next tick.
-_REPEAT_STOP_S = 0.02
-
 #: Without a supervisor: time for the last states, and for Zenoh to close.
 _ORPHAN_S = 3.0
+
+#: A stop without control's answer for so long is repeated; control answers in its next tick.
+_REPEAT_STOP_S = 0.02
 
 _EVENTS = {
     pb.ENABLE: ModeEvent.ENABLE,

@@ -5,6 +5,7 @@ The time is an argument: the same loop runs on the clock, and in simulated time 
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from controllers.settings import ControlSettings
 from controllers.targets import KIND_OF, TargetKind
 from controllers.tasks.tip_pose import quaternion_from_rotation
 from controllers.trajectory import ReferenceLimits
-from hardware.guard import Guard
+from hardware.guard import Guard, Intervention
 from hardware.guarded import GuardedDevice, GuardedHardware
 from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
@@ -33,10 +34,17 @@ from service.commands import (
 from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
+from service.monitors.settings import MonitorSettings
+from service.safety import Safety
 from service.steering import Steering
 
 #: Gauge pressure below which a chamber counts as vented, Pa: ten times the sensors' noise.
 NEAR_ZERO_PA = 2000.0
+
+#: What the guard changed, and the field that counts the ticks in which it did.
+_GUARD_COUNTS = tuple(
+    (int(kind), f"guard_{kind.name.lower()}") for kind in Intervention if kind.name
+)
 
 
 @dataclass(frozen=True)
@@ -46,8 +54,10 @@ class LoopSettings:
     period_s: float
     control: ControlSettings
     timeouts: Timeouts
+    monitors: MonitorSettings
     start_ns: int
     start_unix_ns: int
+    supply_flow_max_pa_s: float = inf
     reference: ReferenceLimits = field(default_factory=ReferenceLimits)
     feedback: FeedbackSettings = field(default_factory=FeedbackSettings)
 
@@ -72,10 +82,11 @@ class Loop:
         emit: Callable[[pb.Event], None],
     ) -> None:
         self._settings = settings
-        self._hardware = _guarded(hardware, arm, settings.period_s)
+        self._hardware = _guarded(hardware, arm, settings)
         self._controller = Controller(arm, settings.control)
         self._estimator = Estimator(arm)
         self._keeper = ModeKeeper(settings.timeouts, self._stamped(emit))
+        self._safety = Safety(arm, settings.monitors, self._keeper)
         self._steering = Steering(
             arm,
             self._controller,
@@ -143,17 +154,17 @@ class Loop:
         """Tell something that changes no mode."""
         self._keeper.tell(level, code, text)
 
-    def fault(self, cause: str) -> None:
+    def _fault(self, error: Exception) -> None:
         """Latch a fault and vent at once; where even that fails, the next tick tries again."""
-        now_s = self._now_ns * 1e-9
+        cause, now_s = f"{type(error).__name__}: {error}", self._now_ns * 1e-9
         self._sent = np.zeros_like(self._sent)
         self._tick["pressure_sent_pa"] = self._tick["pressure_commanded_pa"] = self._sent
         try:
             self._hardware.vent(now_s)
-        except Exception as error:
-            cause += f"; the device could not be vented: {error}"
+        except Exception as vent_error:
+            cause += f"; the device could not be vented: {vent_error}"
             self._tick["pressure_sent_pa"] = np.nan
-        self._keeper.apply(ModeEvent.FAULT, now_s, cause=cause)
+        self._safety.failed(error, cause, now_s)
 
     def tick(
         self, now_ns: int, commands: list[Command], disk: Disk, timing: Timing
@@ -169,8 +180,10 @@ class Loop:
         replies: list[ModeReply] = []
         try:
             self._run(commands, replies, dt_s, disk)
+            self._safety.worked()
         except Exception as error:  # whatever it is: an arm that nobody controls must lose its air
-            self.fault(f"{type(error).__name__}: {error}")
+            self._fault(error)
+        self._tick["active_faults"] = self._safety.bits
         self._tick["mode"] = int(self._keeper.mode)
         return self._record, replies
 
@@ -179,12 +192,15 @@ class Loop:
     ) -> None:
         now_s = self._now_ns * 1e-9
         self._tick["pressure_measured_pa"] = np.nan  # a record of a failed reading shows no old one
+        self._tick["supply_pa"] = self._tick["measurement_age_s"] = np.nan
         try:
             measurement = self._hardware.read(now_s)
             self._tick["pressure_measured_pa"] = measurement.pressures_pa
         finally:  # a stop is heard and answered also when the device fails
             for command in commands:
                 self._take(command, now_s, replies)
+        sent = self._hardware.sent_pa
+        self._safety.look(measurement, self._tick, self._tip_pose, sent, self._now_ns, dt_s)
         self._watch(now_s, disk)
         wanted = self._control(dt_s, now_s)
         self._send(wanted, now_s)
@@ -214,7 +230,8 @@ class Loop:
                 self._keeper.apply(request.event, now_s, request.client)
             reason = ""
         else:
-            reason = self._keeper.request(request.event, now_s, request.client)
+            blocked = self._safety.why_not(request.event, now_s)
+            reason = self._keeper.request(request.event, now_s, request.client, blocked)
         if before != Mode.ACTIVE and self._keeper.mode == Mode.ACTIVE:
             self._arm(before)
         return ModeReply(request.request_id, not reason, reason, self._keeper.mode, self.sequence)
@@ -256,18 +273,29 @@ class Loop:
                 return self._wanted
             return np.minimum(np.maximum(self._wanted + dither_pa, self._low), self._high)
         self._tick["tip_commanded_position_m"] = np.nan
+        ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
+        if ramping is not None:
+            return ramping
         return self._sent  # hold keeps the last; in the vented modes it is zero already
 
     def _send(self, wanted: Array, now_s: float) -> None:
-        if self._keeper.mode in VENTED_MODES:
+        ramping = self._safety.ramping_pa(now_s) is not None
+        if self._keeper.mode in VENTED_MODES and not ramping:
             self._hardware.vent(now_s)
             self._sent = np.zeros_like(self._sent)
             self._tick["guard_intervention"] = 0
             return
         guarded = self._hardware.write(wanted, now_s, now_s)
         self._sent = guarded.pressures_pa
-        self._interventions += bool(guarded.intervention)
-        self._tick["guard_intervention"] = int(guarded.intervention)
+        self._count(int(guarded.intervention))
+
+    def _count(self, intervention: int) -> None:
+        self._tick["guard_intervention"] = intervention
+        if intervention:
+            self._interventions += 1
+            for bit, name in _GUARD_COUNTS:
+                if intervention & bit:
+                    self._tick[name] += 1
 
     def _fill_heading(self, timing: Timing) -> None:
         """Write down what is known of every tick, even of one that fails."""
@@ -286,6 +314,9 @@ class Loop:
         tick["pressure_sent_pa"] = self._hardware.sent_pa
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
+        tick["supply_pa"] = measurement.supply_pa
+        taken_s = measurement.taken_s
+        tick["measurement_age_s"] = 0.0 if taken_s is None else self._now_ns * 1e-9 - taken_s
         self._fill_estimate(measurement)
         self._fill_target()
         if measurement.true_tip is not None:
@@ -326,8 +357,11 @@ class Loop:
             tick["target_orientation_xyzw"] = quaternion
 
 
-def _guarded(hardware: Hardware | LinkedDevice, arm: Arm, period_s: float) -> GuardedHardware:
+def _guarded(
+    hardware: Hardware | LinkedDevice, arm: Arm, settings: LoopSettings
+) -> GuardedHardware:
     """Put the guard right before the device; one in a process of its own has it there."""
     if isinstance(hardware, LinkedDevice):
         return hardware
-    return GuardedDevice(hardware, Guard(arm, period_s), arm.n_sections)
+    guard = Guard(arm, settings.period_s, settings.supply_flow_max_pa_s)
+    return GuardedDevice(hardware, guard, arm.n_sections)

@@ -41,9 +41,10 @@ class ModeEvent(IntEnum):
     DISK_FULL = 13
     DISK_STILL_FULL = 14
     LEASE_RELEASED = 15
+    FAULT_HOLD = 16  # a fault whose policy is to hold
 
 
-#: Modes in which nothing but zeros is sent to the device.
+#: Modes without air in the arm: nothing but zeros is sent to the device, in fault after the ramp.
 VENTED_MODES = frozenset({Mode.IDLE, Mode.READY, Mode.FAULT, Mode.ESTOP})
 
 _HOLDS = (
@@ -53,6 +54,7 @@ _HOLDS = (
     ModeEvent.LEASE_RELEASED,
     ModeEvent.GATEWAY_SILENT,
     ModeEvent.DISK_FULL,
+    ModeEvent.FAULT_HOLD,
 )
 _VENTS = (
     ModeEvent.VENT,
@@ -89,7 +91,7 @@ _WHY_NOT: dict[tuple[Mode, ModeEvent], str] = {
     (Mode.READY, ModeEvent.HOLD): "the arm is vented: there is nothing to hold",
     (Mode.FAULT, ModeEvent.HOLD): "the arm is vented: there is nothing to hold",
     (Mode.ESTOP, ModeEvent.HOLD): "the arm is vented: there is nothing to hold",
-    (Mode.FAULT, ModeEvent.VENT): "the arm is vented already, and the fault stays until reset",
+    (Mode.FAULT, ModeEvent.VENT): "the air goes already, and the fault stays until reset",
     (Mode.ESTOP, ModeEvent.VENT): "the arm is vented already, and the stop stays until reset",
 }
 

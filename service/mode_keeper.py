@@ -23,6 +23,17 @@ class Timeouts:
     full_disk_vent_s: float
 
 
+@dataclass(frozen=True)
+class Told:
+    """What an event says instead of what is usual for its mode event."""
+
+    level: "pb.Level"
+    code: str
+    text: str
+    cause: str
+    remedy: str
+
+
 @dataclass(slots=True)  # made in every tick: freezing it would cost more than all of its use
 class Watched:
     """What the keeper looks at once a tick. Ages in seconds; None means there is none."""
@@ -64,6 +75,7 @@ _TEXTS: dict[ModeEvent, tuple[str, str, str]] = {
         "the disk takes no more of the log",
         "free some space in the sessions' directory; nothing is lost for 30 s",
     ),
+    ModeEvent.FAULT_HOLD: ("the arm holds", "a fault", "remove the cause, then enable again"),
     ModeEvent.DISK_STILL_FULL: ("the arm vents", "the disk is still full", "free some space"),
 }
 
@@ -75,6 +87,7 @@ _WARNINGS = frozenset(
         ModeEvent.GATEWAY_LOST,
         ModeEvent.DISK_FULL,
         ModeEvent.DISK_STILL_FULL,
+        ModeEvent.FAULT_HOLD,
         ModeEvent.ESTOP,
     }
 )
@@ -90,11 +103,18 @@ class ModeKeeper:
         self._entered_s = self._operator_s = self._not_full_s = 0.0
         self._disk = Disk.STARTING
 
-    def request(self, event: ModeEvent, now_s: float, client: str) -> str:
-        """Apply what somebody asked for; return why not, or an empty string."""
+    def request(self, event: ModeEvent, now_s: float, client: str, blocked: str = "") -> str:
+        """Apply what somebody asked for; return why not, or an empty string.
+
+        ``blocked`` says what forbids it although the mode would allow it.
+        """
         reason = ""
         if next_mode(self.mode, event) is None:
             reason = why_not(self.mode, event)
+            if blocked and event == ModeEvent.ENABLE:
+                reason += f"; {blocked}"
+        elif blocked:
+            reason = blocked
         elif event == ModeEvent.ENABLE and self._disk in (Disk.LOW, Disk.FULL):
             reason = (
                 "too little free space to record the session; free some in the sessions' "
@@ -106,7 +126,14 @@ class ModeKeeper:
             self.apply(event, now_s, client)
         return reason
 
-    def apply(self, event: ModeEvent, now_s: float, client: str = "", cause: str = "") -> bool:
+    def apply(
+        self,
+        event: ModeEvent,
+        now_s: float,
+        client: str = "",
+        cause: str = "",
+        told: Told | None = None,
+    ) -> bool:
         """Apply an event if it means anything now; return whether it did."""
         after = next_mode(self.mode, event)
         if after is None:
@@ -115,6 +142,9 @@ class ModeKeeper:
         self.mode = after
         if changed:
             self._entered_s = now_s
+            if told is not None:
+                self.tell(told.level, told.code, told.text, told.cause, told.remedy, client)
+                return True
             text, usual_cause, remedy = _TEXTS.get(event, ("fault: the arm vents", "", "reset"))
             level = pb.WARNING if event in _WARNINGS else pb.INFO
             level = pb.ERROR if event == ModeEvent.FAULT else level

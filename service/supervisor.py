@@ -42,7 +42,7 @@ _FIRST_TICK_S = 20.0
 _END_S = 5.0
 
 #: The end takes no longer than this: more than all its patience together.
-LAST_RESORT_S = 50.0
+LAST_RESORT_S = 60.0
 
 #: Libraries that would start threads of their own in every process.
 _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}

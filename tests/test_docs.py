@@ -14,7 +14,7 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from service import config
 from service.mode import TABLE, Mode, ModeEvent
-from service.tables import arm, control, festo, hardware, outputs
+from service.tables import arm, control, festo, hardware, monitors, outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -28,6 +28,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "`[[arm.sections]]`": arm.SectionConfig,
     "`[control]`": control.ControlConfig,
     "`[hardware]`": hardware.HardwareConfig,
+    "`[monitors]`": monitors.MonitorsConfig,
     "`[simulator]`": hardware.SimulatorConfig,
     "`[festo_cpx]`": festo.FestoCpxConfig,
     "`[festo_vtem]`": festo.FestoVtemConfig,

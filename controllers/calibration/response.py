@@ -172,8 +172,8 @@ def _fit_mode(
             modelled = _swinging(static, x[0], x[1])
             columns = np.column_stack([modelled, np.ones_like(modelled)])
             gain, offset = np.linalg.lstsq(columns, measured, rcond=None)[0]
-            time_s = STEP_S * np.arange(len(measured))
-            found.append(StepAnswer(time_s, measured, gain * modelled + offset))
+            time_s: Array = STEP_S * np.arange(len(measured), dtype=np.float64)
+            found.append(StepAnswer(time_s, measured, np.asarray(gain * modelled + offset)))
         return found
 
     def rows(x: Array) -> Array:

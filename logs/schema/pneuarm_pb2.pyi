@@ -281,7 +281,7 @@ class Reply(_message.Message):
     def __init__(self, accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., lease_secret: _Optional[str] = ..., lease_holder: _Optional[str] = ..., state_sequence: _Optional[int] = ...) -> None: ...
 
 class ArmState(_message.Message):
-    __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "reference_position_m", "reference_velocity_m_s", "reference_error_m", "tip_model_position_m", "tip_offset_m", "tip_offset_orientation_xyzw", "tip_estimated_sigma_m", "tip_estimated_source", "tip_poses_refused")
+    __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "active_faults", "supply_pa", "measurement_age_s", "guard_range", "guard_slew", "guard_not_finite", "guard_too_old", "guard_supply", "reference_position_m", "reference_velocity_m_s", "reference_error_m", "tip_model_position_m", "tip_offset_m", "tip_offset_orientation_xyzw", "tip_estimated_sigma_m", "tip_estimated_source", "tip_poses_refused")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     TIME_UNIX_NS_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
@@ -315,6 +315,14 @@ class ArmState(_message.Message):
     WAKE_LATENCY_S_FIELD_NUMBER: _ClassVar[int]
     COMPUTE_S_FIELD_NUMBER: _ClassVar[int]
     OVERRUNS_FIELD_NUMBER: _ClassVar[int]
+    ACTIVE_FAULTS_FIELD_NUMBER: _ClassVar[int]
+    SUPPLY_PA_FIELD_NUMBER: _ClassVar[int]
+    MEASUREMENT_AGE_S_FIELD_NUMBER: _ClassVar[int]
+    GUARD_RANGE_FIELD_NUMBER: _ClassVar[int]
+    GUARD_SLEW_FIELD_NUMBER: _ClassVar[int]
+    GUARD_NOT_FINITE_FIELD_NUMBER: _ClassVar[int]
+    GUARD_TOO_OLD_FIELD_NUMBER: _ClassVar[int]
+    GUARD_SUPPLY_FIELD_NUMBER: _ClassVar[int]
     REFERENCE_POSITION_M_FIELD_NUMBER: _ClassVar[int]
     REFERENCE_VELOCITY_M_S_FIELD_NUMBER: _ClassVar[int]
     REFERENCE_ERROR_M_FIELD_NUMBER: _ClassVar[int]
@@ -357,6 +365,14 @@ class ArmState(_message.Message):
     wake_latency_s: float
     compute_s: float
     overruns: int
+    active_faults: int
+    supply_pa: float
+    measurement_age_s: float
+    guard_range: int
+    guard_slew: int
+    guard_not_finite: int
+    guard_too_old: int
+    guard_supply: int
     reference_position_m: _containers.RepeatedScalarFieldContainer[float]
     reference_velocity_m_s: _containers.RepeatedScalarFieldContainer[float]
     reference_error_m: float
@@ -366,7 +382,7 @@ class ArmState(_message.Message):
     tip_estimated_sigma_m: float
     tip_estimated_source: EstimateSource
     tip_poses_refused: int
-    def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., reference_position_m: _Optional[_Iterable[float]] = ..., reference_velocity_m_s: _Optional[_Iterable[float]] = ..., reference_error_m: _Optional[float] = ..., tip_model_position_m: _Optional[_Iterable[float]] = ..., tip_offset_m: _Optional[_Iterable[float]] = ..., tip_offset_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_estimated_sigma_m: _Optional[float] = ..., tip_estimated_source: _Optional[_Union[EstimateSource, str]] = ..., tip_poses_refused: _Optional[int] = ...) -> None: ...
+    def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., active_faults: _Optional[int] = ..., supply_pa: _Optional[float] = ..., measurement_age_s: _Optional[float] = ..., guard_range: _Optional[int] = ..., guard_slew: _Optional[int] = ..., guard_not_finite: _Optional[int] = ..., guard_too_old: _Optional[int] = ..., guard_supply: _Optional[int] = ..., reference_position_m: _Optional[_Iterable[float]] = ..., reference_velocity_m_s: _Optional[_Iterable[float]] = ..., reference_error_m: _Optional[float] = ..., tip_model_position_m: _Optional[_Iterable[float]] = ..., tip_offset_m: _Optional[_Iterable[float]] = ..., tip_offset_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_estimated_sigma_m: _Optional[float] = ..., tip_estimated_source: _Optional[_Union[EstimateSource, str]] = ..., tip_poses_refused: _Optional[int] = ...) -> None: ...
 
 class Event(_message.Message):
     __slots__ = ("time_unix_ns", "level", "source", "code", "text", "cause", "remedy", "client_id", "mode", "payload")

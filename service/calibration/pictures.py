@@ -35,8 +35,8 @@ def pictures(calibration: Calibration) -> dict[str, bytes]:
     if calibration.response is not None:
         rows = -(-min(6, len(calibration.response.steps)) // 3)
         drawn[
-            "Steps of the pressure: the tip in the direction of its way, measured, and as the fitted mode "
-            "swings. The modelled curve is shifted and scaled onto the measured one."
+            "Steps of the pressure: the tip along its way, measured and as the fitted mode swings. "
+            "The modelled curve is shifted and scaled onto the measured one."
         ] = _picture(_steps, calibration, (11, 3.2 * rows))
     return drawn
 

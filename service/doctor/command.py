@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from controllers.errors import ConfigurationError
+from service import backends
 from service.config import Configuration, load
 from service.doctor import device, machine, places, rights, timing
 from service.doctor.finding import Finding, Verdict, summary
@@ -50,6 +51,10 @@ def _configuration(configuration: Configuration, path: Path | None) -> Finding:
         f"{3 * len(arm.sections)} chambers, {configuration.control.rate_hz:g} Hz, "
         f"adapter {configuration.hardware.adapter}"
     )
+    try:
+        backends.check(configuration)
+    except ConfigurationError as error:
+        return Finding("configuration", Verdict.FAILED, f"{text}\n{error}")
     return Finding("configuration", Verdict.OK, text)
 
 

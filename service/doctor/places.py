@@ -14,6 +14,7 @@ from packaging.requirements import Requirement
 from controllers.errors import ConfigurationError
 from logs.rings import HOLD_S
 from logs.tick import tick_dtype
+from service import backends
 from service.config import Configuration, log_directory
 from service.doctor.finding import Finding, Verdict
 from service.local_stop import lock
@@ -85,7 +86,7 @@ def other_daemon(configuration: Configuration) -> Finding:
     name = "arm and device"
     for kind, value in (
         ("arm", configuration.arm.name),
-        ("device", configuration.device_address),
+        ("device", backends.address(configuration)),
     ):
         try:
             lock(kind, value).close()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
 from logs.tick import tick_dtype
 from service import backends
-from service.commands import Command, Heartbeat, ModeReply, RequestMode, SetTarget
+from service.commands import Command, Heartbeat, ModeReply, RequestMode, SetTarget, SetTipPose
 from service.config import Configuration, load
 from service.loop import Loop, LoopSettings, Timing
 from service.mode import Mode, ModeEvent
@@ -76,6 +77,7 @@ class Bench:
         rate_hz: float = 500.0,
         seed: int = 0,
         configuration: Configuration | None = None,
+        supply_flow_max_bar_s: float = inf,
     ) -> None:
         self.configuration = configuration or configuration_of(preset, rate_hz, seed)
         rate_hz = self.configuration.control.rate_hz
@@ -87,6 +89,8 @@ class Bench:
             period_s=1.0 / rate_hz,
             control=self.configuration.control.settings(),
             timeouts=TIMEOUTS,
+            monitors=self.configuration.monitors.settings(),
+            supply_flow_max_pa_s=supply_flow_max_bar_s * 1e5,
             start_ns=START_NS,
             start_unix_ns=START_UNIX_NS,
         )
@@ -102,6 +106,9 @@ class Bench:
         self.disk = Disk.OK
         self.replies: list[ModeReply] = []
         self.records: list[bytes] = []
+        self.tip_pose: Callable[[], Array] | None = None  # what motion capture sees now
+        self.overruns_per_tick = 0.0
+        self._overruns = 0.0
         self._request_id = 0
         self._sequence = 0
 
@@ -124,9 +131,12 @@ class Bench:
     def tick(self, *commands: Command) -> np.void:
         self.now_ns += self.period_ns
         given: list[Command] = [Heartbeat(self.operator)] if self.heartbeat else []
-        record, replies = self.loop.tick(
-            self.now_ns, [*given, *commands], self.disk, Timing(compute_s=1e-4)
-        )
+        if self.tip_pose is not None and self.records:
+            position = np.array(self.tip_pose())
+            given.append(SetTipPose(position, np.array([0.0, 0.0, 0.0, 1.0]), self.now_ns))
+        self._overruns += self.overruns_per_tick
+        timing = Timing(compute_s=1e-4, overruns=int(self._overruns))
+        record, replies = self.loop.tick(self.now_ns, [*given, *commands], self.disk, timing)
         self.records.append(bytes(record))
         self.replies += replies
         return self.newest

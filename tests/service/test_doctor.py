@@ -12,9 +12,9 @@ from service.clock import Wake
 from service.config import Configuration, load
 from service.devices import serial_paths, tcp_address
 from service.doctor import device, machine, places, rights, timing
+from service.doctor.command import examine
 from service.doctor.finding import Finding, Verdict, summary
 from service.local_stop import lock
-from service.tables.table import Table
 from tests.service.daemon import ROOT, Daemon, free_port, run_command
 
 
@@ -134,7 +134,7 @@ def test_a_device_on_the_network_is_reached_or_not() -> None:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
         port = listener.getsockname()[1]
-        there = configured(hardware={"adapter": "festo_cpx", "device": f"127.0.0.1:{port}"})
+        there = configured(hardware={"adapter": "other", "device": f"127.0.0.1:{port}"})
         assert device.reachable(there).verdict is Verdict.OK
     gone = device.reachable(there)
     assert gone.verdict is Verdict.FAILED
@@ -160,29 +160,17 @@ def test_a_device_file_is_there_and_may_be_opened_or_not(
     assert "plugged in" in missing.text
 
 
-class Festo(Table):
-    """A table as an adapter may bring it."""
-
-    host: str = "10.0.0.2"
-    port: int = 1502
-    line: str = "/dev/ttyUSB7"
-
-
-class Equipped(Configuration):
-    """A configuration with such a table."""
-
-    festo: Festo
-
-
 def test_addresses_are_found_in_the_tables_of_an_adapter() -> None:
     assert serial_paths(load()) == []
     assert tcp_address(load()) is None
-    named = configured(hardware={"adapter": "festo_cpx", "device": "cpx.lab"})
+    terminal = {"host": "10.0.0.2", "port": 1502}
+    cpx = configured(hardware={"adapter": "festo-cpx"}, festo_cpx=terminal)
+    assert tcp_address(cpx) == ("10.0.0.2", 1502)
+    named = configured(hardware={"adapter": "other", "device": "cpx.lab"})
     assert tcp_address(named) == ("cpx.lab", 502)
-    hardware = load().hardware.model_copy(update={"adapter": "festo_cpx"})
-    with_table = Equipped(**dict(load()) | {"hardware": hardware, "festo": Festo()})
-    assert tcp_address(with_table) == ("10.0.0.2", 1502)
-    assert serial_paths(with_table) == ["/dev/ttyUSB7"]
+    line = configured(hardware={"adapter": "other", "device": "/dev/ttyUSB7"})
+    assert serial_paths(line) == ["/dev/ttyUSB7"]
+    assert tcp_address(line) is None
     # Other tables hold hosts and ports too, and none of them is the device's.
     unknown = configured(hardware={"adapter": "other"})
     assert tcp_address(unknown) is None
@@ -268,6 +256,14 @@ def test_the_command_says_one_finding_a_check_and_its_status(tmp_path: Path) -> 
     assert not daemon.logs.exists()
     page = (ROOT / "docs" / "deployment.md").read_text()
     assert checks == re.findall(r"^\| ([a-z][\w -]+) \| .* \| .* \|$", page, re.M)[1:]
+
+
+def test_a_terminal_that_lacks_what_the_daemon_asks_for_fails(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text('[hardware]\nadapter = "festo-cpx"\n')
+    finding = next(examine(path, None))
+    assert (finding.check, finding.verdict) == ("configuration", Verdict.FAILED)
+    assert "festo_cpx.host" in finding.text
 
 
 def test_a_wrong_configuration_is_told_and_the_machine_is_looked_at_all_the_same(

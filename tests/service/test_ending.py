@@ -123,6 +123,7 @@ def test_an_end_that_stands_still_says_where_and_ends(
 
 def test_the_last_resort_comes_after_all_patience() -> None:
     patience_s = supervisor._END_S + sum(
-        supervisor.Supervisor._patience_s(name) + 2.0 for name in ("gateway", "recorder", "viewer")
+        supervisor.Supervisor._patience_s(name) + 2.0
+        for name in ("device", "gateway", "recorder", "viewer")
     )
     assert patience_s < supervisor.LAST_RESORT_S

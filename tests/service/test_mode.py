@@ -23,6 +23,7 @@ EXPECTED = {
     "GATEWAY_LOST":   "-      -       IDLE    IDLE    -       -",
     "DISK_FULL":      "-      -       HOLD    -       -       -",
     "DISK_STILL_FULL": "-     -       IDLE    IDLE    -       -",
+    "FAULT_HOLD":     "-      -       HOLD    -       -       -",
 }  # fmt: skip
 COLUMNS = ("IDLE", "READY", "ACTIVE", "HOLD", "FAULT", "ESTOP")
 PAIRS = [(mode, event) for mode in Mode for event in ModeEvent]
