@@ -10,8 +10,12 @@ from tests.service.daemon import enough
 #: What breaks the transport zeroes the device: by a new connection, or by its own watchdog.
 ZERO_S = 0.3
 
-#: A monitor has seen enough of a broken sensor or valve after so long, and the ramp is over.
-_SEEN_S, _RAMPED_S = 2.0, 4.0
+#: A monitor has seen enough of a broken sensor or valve after two turns of the circle, and the ramp
+#: is over after so long.
+_SEEN_S, _RAMPED_S = 4.0, 4.0
+
+#: A leak is looked for in an arm that holds, from so long after its beginning.
+_SETTLED_S = 1.2
 
 #: A serial device that is there again is connected within so long.
 _AGAIN_S = 2.0
@@ -86,12 +90,33 @@ def _physical(words: Words, *modes: int, zeroed: bool = True) -> Callable[[Rig, 
     return inject
 
 
-def _noisy(rig: Rig, injection: Injection) -> None:
-    """A noisy sensor moves nothing: pressures are commanded by the model, not by its reading."""
+def _leak(rig: Rig, injection: Injection) -> None:
+    """In the fullest chamber of an arm that holds: where a valve regulates, a leak is refilled."""
+    assert rig.emulator is not None
+    rig.watcher.hold()
+    rig.wait_until(enough(_SETTLED_S), "settled pressures")
+    pressures_pa = [abs(p) for p in rig.watcher.state().pressure_sent_pa]
+    injection.must_reach(pb.FAULT, within_s=_SEEN_S)
+    injection.begin()
+    rig.emulator.inject(f"leak {pressures_pa.index(max(pressures_pa))}")
+    rig.wait_for_mode(pb.FAULT)
+    rig.emulator.inject("clear")
+
+
+def _unclear(words: Words) -> Callable[[Rig, Injection], None]:
+    """Something that may be too small to be seen: it changes nothing, or it is a fault."""
+
+    def inject(rig: Rig, injection: Injection) -> None:
+        _look_on(rig, injection, words)
+
+    return inject
+
+
+def _look_on(rig: Rig, injection: Injection, words: Words) -> None:
     assert rig.emulator is not None
     injection.begin()
-    rig.emulator.inject(_chamber("sensor-noisy")(injection))
-    rig.wait_until(enough(1.0), "noise")
+    rig.emulator.inject(words(injection))
+    rig.wait_until(enough(1.0), "what comes of it")
     injection.must_stay(pb.ACTIVE, pb.HOLD, pb.FAULT)
     rig.emulator.inject("clear")
 
@@ -147,10 +172,16 @@ FAULTS = (
     _air("sensor not a number", _chamber("sensor-nan")),
     _air("sensor frozen", _chamber("sensor-frozen")),
     _air("sensor offset, 0.4 to 0.8 bar", _offset),
-    Fault("air: sensor noisy, 0.2 bar", "goes on, or fault", _noisy, device=_CPX),
+    Fault(
+        "air: sensor noisy, 0.2 bar",
+        "goes on, or fault",
+        _unclear(_chamber("sensor-noisy")),
+        device=_CPX,
+    ),
     _air("valve stuck open", _chamber("valve-stuck-open")),
     _air("valve stuck closed", _chamber("valve-stuck-closed")),
-    _air("leak", _chamber("leak")),
+    Fault("air: leak while it holds", _RAMPED, _leak, device=_CPX),
+    Fault("air: leak while it moves", "goes on, or fault", _unclear(_chamber("leak")), device=_CPX),
     _air("supply lost", lambda i: "supply-lost", "holds or fault", pb.HOLD, pb.FAULT),
     *_serial("ctrl-p"),
     *_serial("esp32"),
