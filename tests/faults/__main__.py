@@ -70,7 +70,13 @@ def _parse() -> argparse.Namespace:
 
 
 def _chosen(names: list[str] | None) -> list[Fault]:
-    return [f for f in FAULTS if not names or any(name in f.name for name in names)]
+    """Return the faults that are meant: a whole name means that one, a part all that have it."""
+    if not names:
+        return list(FAULTS)
+    whole = {fault.name for fault in FAULTS}
+    return [
+        f for f in FAULTS if any(n == f.name or (n in f.name and n not in whole) for n in names)
+    ]
 
 
 if __name__ == "__main__":

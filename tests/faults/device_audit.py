@@ -63,7 +63,7 @@ def _check_zero(record: Record, injection: Injection) -> None:
         return
     at = after[0]
     injection.safe_s = float(record.time_ns[at] - begin_ns) * 1e-9
-    injection.figures["zeroed_by_the_watchdog_count"] = float(record.why[at] == "watchdog")
+    injection.figures["zeroed_by_the_watchdog_times"] = float(record.why[at] == "watchdog")
     injection.check(
         "zero in time",
         injection.safe_s <= limit_s,
@@ -73,5 +73,4 @@ def _check_zero(record: Record, injection: Injection) -> None:
     emptied = np.flatnonzero((record.sampled_ns > record.time_ns[at]) & empty)
     injection.check("the chambers are empty", len(emptied) > 0)
     if len(emptied):
-        elapsed_ns = record.sampled_ns[emptied[0]] - begin_ns
-        injection.figures["chambers_below_10_mbar_ms"] = float(elapsed_ns) * 1e-6
+        injection.empty_s = float(record.sampled_ns[emptied[0]] - begin_ns) * 1e-9

@@ -33,6 +33,7 @@ class Injection:
     safe: frozenset[int] = frozenset()
     allowed: frozenset[int] = frozenset()
     safe_s: float | None = None
+    empty_s: float | None = None
     within_s: float | None = None
     event: str = ""
     held_after_s: float | None = None
@@ -109,3 +110,8 @@ class Row:
     def times_s(self) -> list[float]:
         """Times to the safe state, s."""
         return sorted(i.safe_s for i in self.injections if i.safe_s is not None)
+
+    @property
+    def empty_s(self) -> list[float]:
+        """Times until the chambers behind an emulated device were empty, s."""
+        return [i.empty_s for i in self.injections if i.empty_s is not None]
