@@ -20,7 +20,7 @@ from tests.faults.log_audit import audit_log
 from tests.faults.rig import Rig
 
 #: How long an arm has moved at most when the fault comes, s.
-_MOVES_S = 0.8
+_MOVES_S = 0.5
 
 _FAILED = (Exception, pytest.fail.Exception)
 
