@@ -119,7 +119,7 @@ class FaultRun:
         path = rig.log_path()
         audit_log(path, rig.offset_ns, arm, self._unaudited, rig.emulator is not None)
         if rig.emulator is not None:
-            audit_device(rig.emulator.record, arm, self._unaudited)
+            audit_device(rig.emulator.record, arm, self._unaudited, rig.emulator.jitter_s)
 
 
 def run_campaign(faults: list[Fault], times: int, seed: int) -> Iterator[Row]:

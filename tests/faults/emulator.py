@@ -21,6 +21,9 @@ EMPTY_PA = 1000.0
 _LAST_BYTES = 1 << 18
 
 
+#: A serial line acknowledges no setpoint, and its emulator notes it when it comes to read it.
+_SERIAL_JITTER_S = 0.01
+
 #: Arms for devices that cannot move the default one: an ESP32's pump gives 0.13 bar.
 _ARMS: dict[str, dict[str, Any]] = {
     "esp32": {
@@ -51,6 +54,7 @@ class Emulator:
         own = _ARMS.get(what, {})
         arm = folder / f"{what}.toml"
         arm.write_text(tomli_w.dumps(own))
+        self.jitter_s = 0.0 if what.startswith("festo") else _SERIAL_JITTER_S
         self.record = Path(tempfile.mkstemp(".jsonl", "device-", folder)[1])
         self._program = Program(
             "pneuarm", "emulate", what, "--arm", str(arm), "--record", str(self.record)
