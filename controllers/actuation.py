@@ -5,6 +5,7 @@ p, so that one map serves chambers that lengthen under pressure and shorten unde
 ``b > 0`` the chamber gets softer as it fills, as table 1 of the paper shows.
 """
 
+import casadi as ca
 import numpy as np
 
 from controllers.arm import LENGTH_MARGIN_M, Arm, Array
@@ -27,6 +28,15 @@ class PressureMap:
         lengthening = lengths_m - self._rest_m
         root = np.sqrt(self._linear**2 + 4.0 * self._quadratic * np.abs(lengthening))
         return 2.0 * lengthening / (self._linear + root)
+
+
+def symbolic_pressures(arm: Arm, lengths: ca.SX) -> ca.SX:
+    """Gauge pressures (n_chambers,) of lengths in C order: :class:`PressureMap` in symbols."""
+    lengthening = lengths - ca.DM(arm.rest_lengths_m.reshape(-1))
+    linear = ca.DM(arm.per_chamber("lengthening_m_per_pa").reshape(-1))
+    quadratic = ca.DM(arm.per_chamber("softening_m_per_pa2").reshape(-1))
+    root = ca.sqrt(linear**2 + 4.0 * quadratic * ca.fabs(lengthening))
+    return 2.0 * lengthening / (linear + root)
 
 
 def pressure_length_bounds_m(arm: Arm) -> tuple[Array, Array]:

@@ -23,14 +23,23 @@ class TargetKind(IntEnum):
     TWIST = 3
     LENGTHS = 4
     PRESSURES = 5
+    DIRECTION = 6
+    POINT = 7
+    TASKS = 8
 
 
 @dataclass(frozen=True)
 class PositionTarget:
-    """Tip at ``position_m`` (3,)."""
+    """Tip at ``position_m`` (3,).
+
+    ``nearest_lengths_m`` (n_sections, 3) are the lengths that bring the tip nearest, for a position
+    out of reach, from :meth:`controllers.kinematics.workspace.Workspace.is_reachable`: finding them
+    takes too long for a tick.
+    """
 
     position_m: Array
     law: LawName = LawName.DEFAULT
+    nearest_lengths_m: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,54 @@ class PressuresTarget:
     law: LawName = LawName.DEFAULT
 
 
-Target = PositionTarget | PoseTarget | TwistTarget | LengthsTarget | PressuresTarget
+@dataclass(frozen=True)
+class DirectionTarget:
+    """The tip's z axis along ``direction`` (3,), a unit vector; roll and position free."""
+
+    direction: Array
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class PointTarget:
+    """The backbone's point at ``station`` (0 the base, 1 the tip) at ``position_m`` (3,)."""
+
+    position_m: Array
+    station: float
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class PostureTarget:
+    """Chambers near the middle of their bounds, with what other tasks leave; only in a list."""
+
+    law: LawName = LawName.DEFAULT
+
+
+WeightedTarget = (
+    PositionTarget | PoseTarget | LengthsTarget | DirectionTarget | PointTarget | PostureTarget
+)
+
+
+@dataclass(frozen=True)
+class TasksTarget:
+    """Several at once; ``weights`` has a row a task: its weight, and a pose's for orientation."""
+
+    targets: tuple[WeightedTarget, ...]
+    weights: tuple[tuple[float, float], ...]
+    law: LawName = LawName.DEFAULT
+
+
+Target = (
+    PositionTarget
+    | PoseTarget
+    | TwistTarget
+    | LengthsTarget
+    | PressuresTarget
+    | DirectionTarget
+    | PointTarget
+    | TasksTarget
+)
 
 KIND_OF = {
     PositionTarget: TargetKind.POSITION,
@@ -77,4 +133,7 @@ KIND_OF = {
     TwistTarget: TargetKind.TWIST,
     LengthsTarget: TargetKind.LENGTHS,
     PressuresTarget: TargetKind.PRESSURES,
+    DirectionTarget: TargetKind.DIRECTION,
+    PointTarget: TargetKind.POINT,
+    TasksTarget: TargetKind.TASKS,
 }

@@ -72,7 +72,7 @@ def _section_with_jacobian(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX
     return arc_length * direction, rotation, jacobian
 
 
-def _shape(lengths: ca.SX, section: Section) -> tuple[ca.SX, ca.SX, ca.SX]:
+def symbolic_shape(lengths: ca.SX, section: Section) -> tuple[ca.SX, ca.SX, ca.SX]:
     """``(L, u, v)`` of the three lengths of a section."""
     first, second, third = lengths[0], lengths[1], lengths[2]
     u = ((second - first) + (third - first)) / (3.0 * section.chamber_offset_m)
@@ -88,15 +88,20 @@ def _over_lengths(jacobian: ca.SX, section: Section) -> ca.SX:
     return ca.horzcat(mean - 2.0 * along, side - across, side + across)
 
 
-def symbolic_tip(arm: Arm, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def symbolic_tip(
+    arm: Arm, lengths: ca.SX, shares: list[ca.SX] | None = None
+) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Position, rotation and Jacobian (6, n_chambers) of the tip, ``lengths`` in C order.
 
     Walking from the tip to the base: a section turns what follows it and moves it by its lever.
+    With ``shares`` only this part of every section (0 to 1) counts: a place on the backbone.
     """
     position, rotation, columns = ca.SX(3, 1), ca.SX.eye(3), ca.SX(6, 0)
     for index in reversed(range(arm.n_sections)):
-        shape = _shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
-        step, turn, local = _section_with_jacobian(*shape)
+        share = 1.0 if shares is None else shares[index]
+        shape = symbolic_shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
+        step, turn, local = _section_with_jacobian(*(share * part for part in shape))
+        local = share * local
         lever = turn @ position
         linear = local[:3, :] - ca.skew(lever) @ local[3:, :]
         here = _over_lengths(ca.vertcat(linear, local[3:, :]), arm.sections[index])

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.arm import Arm, Array
-from controllers.controller import Binding
 from controllers.kinematics.constant_curvature import lengths_from_shapes, section_inverse
 from controllers.kinematics.reachability import LimitNames, Reachability, checked_positions
 from controllers.kinematics.workspace_nearest import BoundarySearch
 from controllers.kinematics.workspace_region import ROUNDING_M, SectionRegion
 from controllers.kinematics.workspace_search import SearchedRegion
 from controllers.law import AT_BOUND_M
+from controllers.reach import Binding
 
 
 class Region(Protocol):

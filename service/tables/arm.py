@@ -17,6 +17,7 @@ class SectionConfig(Table):
     length_max_mm: Positive
     bend_max_deg: Annotated[float, Field(gt=0, le=350)]
     length_rate_max_mm_s: Positive
+    length_acceleration_max_mm_s2: Positive
     pressure_min_bar: Annotated[float, Field(ge=-1.0, le=0.0)]
     pressure_max_bar: Annotated[float, Field(gt=0.0, le=10.0)]
     pressure_slew_max_bar_s: Positive
@@ -42,6 +43,7 @@ class SectionConfig(Table):
             length_max_m=self.length_max_mm * MM,
             bend_max_rad=self.bend_max_deg * 0.017453292519943295,
             length_rate_max_m_s=self.length_rate_max_mm_s * MM,
+            length_acceleration_max_m_s2=self.length_acceleration_max_mm_s2 * MM,
             pressure_min_pa=self.pressure_min_bar * BAR,
             pressure_max_pa=self.pressure_max_bar * BAR,
             pressure_slew_max_pa_s=self.pressure_slew_max_bar_s * BAR,
