@@ -12,6 +12,10 @@ NEAR_SINGULAR = 0.1
 DAMPING = 0.05
 
 
+#: A step that is turned aside by less than this part of the largest rate counts as untouched.
+_TOUCHED = 1e-3
+
+
 class ResolvedRate:
     """``dq = base + J^+ (rate dt - J base)``, with J^+ damped only near a singularity.
 
@@ -29,7 +33,17 @@ class ResolvedRate:
         damping = DAMPING**2 * np.maximum(0.0, 1.0 - squares / NEAR_SINGULAR**2)
         along = (directions.T @ rate) / (np.maximum(squares, 0.0) + damping)
         step: Array = base + jacobian.T @ (directions @ along)
-        return clamped(step, problem)
+        step = slowed(step)
+        beside = clamped(step, problem)
+        if np.abs(beside - step).max() < _TOUCHED:
+            return beside
+        # Cut off, the inverse may lead away from the goal; along the steepest descent it cannot.
+        return clamped(slowed(base + jacobian.T @ rate), problem)
+
+
+def slowed(step: Array) -> Array:
+    """Scale a step (n,) to the largest rate: else it is turned aside far from any limit."""
+    return step / max(1.0, float(np.abs(step).max()))
 
 
 def clamped(step: Array, problem: IkProblem) -> Array:

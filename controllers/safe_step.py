@@ -120,6 +120,7 @@ class SafeStep:
             ca.fmin(ca.fmax(projected, 0.0), 1.0),
         )
         slowed = ca.fmin(ca.fmax(factor * wanted, rates - change), rates + change)
+        slowed = ca.fmin(ca.fmax(slowed, -self._rate_max), self._rate_max)
         braked = self._braked(rates, dt)
         return braked + share * (slowed - braked)
 

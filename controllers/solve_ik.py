@@ -26,9 +26,9 @@ from controllers.law import Limits
 from controllers.tasks.rows import Parts, symbolic_rows
 from controllers.tasks.wanted import symbols
 
-#: Weight of ``|x|^2`` beside the task: small against J^T J, large enough to keep P well posed and
-#: the arm quiet before targets out of reach.
-DAMPING = 1e-2
+#: Weight of ``|x|^2`` beside the task: small against J^T J, large enough to keep P well posed. With
+#: 1e-2 the trunk needs 285 of OSQP's iterations in one of 100 ticks at its limits, so 100.
+DAMPING = 5e-2
 
 #: The same where the null space of the tasks is cut out for the posture.
 _NULL_DAMPING = 1e-6
@@ -37,7 +37,7 @@ _NULL_DAMPING = 1e-6
 _POSTURE_SHARE = 0.25
 
 #: A far target pulls as hard as this many times the largest speed of the tip would take.
-_PULL = 10.0
+_PULL = 4.0
 
 #: Largest violation of a row (in units of the largest step) at which a result is still taken.
 ACCEPTED_VIOLATION = 1e-3
@@ -48,13 +48,13 @@ _INFINITY = 1e30
 _SETTINGS = {
     "verbose": False,
     "adaptive_rho": False,
-    "rho": 0.3,
+    "rho": 1.5,
     "scaling": 0,
     "polishing": False,
     "warm_starting": True,
-    "eps_abs": 1e-5,
-    "eps_rel": 1e-5,
-    "max_iter": 400,
+    "eps_abs": 1e-4,
+    "eps_rel": 1e-4,
+    "max_iter": 1000,
     "check_termination": 5,
 }
 
