@@ -61,8 +61,8 @@ class SafeStep:
             [moved, after, ca.vertcat(slack, rows.error_m), rows.transform, rows.tip_jacobian],
         )
         self.wish, self._share = np.zeros(n), np.zeros(1)
-        self.moved_m, self.rates_m_s, self._scalars, transform, jacobian = self.function.results
-        self.tip = TipState(transform[:3, 3], transform[:3, :3], jacobian)
+        self.moved_m, self.rates_m_s, self._scalars, transform, tip = self.function.results
+        self.tip = TipState(transform[:3, 3], transform[:3, :3], tip)
 
     def bind(
         self, lengths_m: Array, rates_m_s: Array, wanted: Array, dt_s: Array, problem: IkProblem

@@ -138,7 +138,7 @@ class IkBuilder:
             [
                 upper_triangle,
                 linear,
-                ca.vertcat(*rows.nonzeros()),
+                _nonzeros(rows),
                 lower,
                 upper,
                 jacobian,
@@ -148,7 +148,7 @@ class IkBuilder:
                 ca.vertcat(beyond, finite, by_feedback),
             ],
         )
-        self.problem = IkProblem(*self.function.results, self.pattern)
+        self.problem = IkProblem(*self.function.results, A_pattern=self.pattern)  # type: ignore[misc]
 
     def _cost(
         self, lengths: ca.SX, dt: ca.SX, want: Parts, whole: bool
@@ -216,13 +216,18 @@ class IkBuilder:
             gradient = ca.substitute(ca.jacobian(limit.slack(lengths), lengths), lengths, stop)
             matrix = ca.vertcat(matrix, -gradient @ ca.diag(step) / smallest)
             bound = allowed(slack, limit.margin_m) / smallest
-            extra_lower.append(ca.DM.ones(bound.shape) * -_INFINITY)
+            extra_lower.append(ca.SX.ones(bound.shape) * -_INFINITY)
             extra_upper.append(bound)
         return (
             matrix,
             ca.vertcat(lower / step, *extra_lower),
             ca.vertcat(upper / step, *extra_upper),
         )
+
+
+def _nonzeros(matrix: ca.SX) -> ca.SX:
+    """Non-zeros of a matrix as a vector, column by column."""
+    return ca.SX(ca.Sparsity.dense(matrix.nnz()), matrix.nz[:])
 
 
 def _solve(gram: ca.SX, right: ca.SX) -> ca.SX:

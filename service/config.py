@@ -17,12 +17,13 @@ from platformdirs import user_state_path
 from pydantic import BaseModel, ValidationError
 
 from controllers.arm import Arm
+from controllers.consistency import refuse_contradictions
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
-from service.tables.table import Table
+from service.tables.table import MM, Table
 
 PRESETS = ("paper", "table1", "trunk")
 
@@ -42,7 +43,9 @@ class Configuration(Table):
     def build_arm(self) -> Arm:
         """Return the arm in SI units."""
         sections = tuple(section.section() for section in self.arm.sections)
-        return Arm(self.arm.name, sections, self.arm.gravity_m_s2)
+        keep_outs = tuple(place.keep_out() for place in self.arm.keep_outs)
+        radius_m = self.arm.body_radius_mm * MM
+        return Arm(self.arm.name, sections, self.arm.gravity_m_s2, keep_outs, radius_m)
 
     @property
     def device_address(self) -> str:
@@ -83,7 +86,7 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
     """Check tables as a file has them; raises ConfigurationError."""
     try:
         configuration = Configuration.model_validate(tables)
-        configuration.build_arm()
+        refuse_contradictions(configuration.build_arm())
     except ValidationError as error:
         items = error.errors()
         if len(items) > 1:  # a list counts as short because its elements were refused: no news

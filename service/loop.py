@@ -33,6 +33,9 @@ from service.mode_keeper import ModeKeeper, Timeouts, Watched
 #: Gauge pressure below which a chamber counts as vented, Pa: ten times the sensors' noise.
 NEAR_ZERO_PA = 2000.0
 
+#: What may happen in every tick is told this often at most.
+_TELL_EVERY_NS = 10_000_000_000
+
 
 @dataclass(frozen=True)
 class LoopSettings:
@@ -80,6 +83,7 @@ class Loop:
         self._heartbeat_ns: int | None = None
         self._operator = False
         self._interventions = 0
+        self._told_fallbacks = self._tell_again_ns = 0
         self._now_ns = self._last_ns = settings.start_ns
         self.sequence = 0
 
@@ -233,10 +237,22 @@ class Loop:
         """Return the pressures wanted now, by mode."""
         if self._keeper.mode == Mode.ACTIVE:
             tip = self._controller.step(dt_s)
+            self._tell_fallbacks()
             self._tick["tip_commanded_position_m"] = tip.position_m
             return self._controller.pressures_pa()
         self._tick["tip_commanded_position_m"] = np.nan
         return self._sent  # hold keeps the last; in the vented modes it is zero already
+
+    def _tell_fallbacks(self) -> None:
+        """Tell that the QP gave nothing and the damped law went on, once in a while."""
+        count, now_ns = self._controller.fallbacks, self._now_ns
+        if count > self._told_fallbacks and now_ns >= self._tell_again_ns:
+            self._keeper.tell(
+                pb.WARNING,
+                "qp_fallback",
+                f"the QP gave no usable step, the damped law went on instead; {count} times so far",
+            )
+            self._told_fallbacks, self._tell_again_ns = count, now_ns + _TELL_EVERY_NS
 
     def _send(self, wanted: Array, now_s: float) -> None:
         if self._keeper.mode in VENTED_MODES:

@@ -25,6 +25,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "Top level": config.Configuration,
     "`[arm]`": arm.ArmConfig,
     "`[[arm.sections]]`": arm.SectionConfig,
+    "`[[arm.keep_outs]]`": arm.KeepOutConfig,
     "`[control]`": control.ControlConfig,
     "`[hardware]`": hardware.HardwareConfig,
     "`[simulator]`": hardware.SimulatorConfig,

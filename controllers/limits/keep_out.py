@@ -68,10 +68,7 @@ def _clearances(place: KeepOut, points: list[ca.SX]) -> list[ca.SX]:
     if not isinstance(place, Sphere):
         return [place.offset_m - ca.dot(ca.DM(place.normal), point) for point in points]
     center = ca.DM(place.center_m)
-    return [
-        _distance(center, first, second) - place.radius_m
-        for first, second in pairwise(points)
-    ]
+    return [_distance(center, first, second) - place.radius_m for first, second in pairwise(points)]
 
 
 def _distance(center: ca.DM, first: ca.SX, second: ca.SX) -> ca.SX:

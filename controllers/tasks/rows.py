@@ -49,15 +49,18 @@ def symbolic_rows(arm: Arm, lengths: ca.SX, want: Parts, whole: bool) -> Rows:
         free = want["direction_follows"] * turned[:, 2] @ turned[:, 2].T
         spin = ORIENTATION_LENGTH_M * weight * (want["turn"] @ jacobian[3:, :])
         blocks.append((weight * turn, ORIENTATION_LENGTH_M * weight * angular, spin - free @ spin))
-        offset, moves = _point(arm, lengths, want)
+        offset, carried = _point(arm, lengths, want)
         weight = ca.sqrt(want["point_weight"])
-        blocks.append((weight * offset, ca.SX(3, 1), weight * moves))
+        blocks.append((weight * offset, ca.SX(3, 1), weight * carried))
         squared += _counted(want["orientation_weight"], turn)
         squared += _counted(want["point_weight"], offset)
     chambers = ca.norm_inf(want["lengths_m"] - lengths) * (want["lengths_weight"] > 0)
     transform = ca.vertcat(ca.horzcat(rotation, position), ca.DM([[0.0, 0.0, 0.0, 1.0]]))
+    error, velocity, moves = (ca.vertcat(*parts) for parts in zip(*blocks, strict=True))
     return Rows(
-        *(ca.vertcat(*parts) for parts in zip(*blocks, strict=True)),
+        error,
+        velocity,
+        moves,
         ca.fmax(ca.sqrt(squared), chambers),
         transform,
         jacobian,

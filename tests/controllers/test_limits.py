@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from controllers.limits.length_rate import LengthRateLimit
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,7 +12,6 @@ from controllers.kinematics.constant_curvature import lengths_from_shapes, shape
 from controllers.law import Limits, clamped_step
 from controllers.limits.bend import BendLimit
 from controllers.limits.length import LengthLimit
-from controllers.limits.length_rate import LengthRateLimit
 from tests.arms import ARMS, paper_arm, random_lengths, trunk_arm
 
 DT_S = 0.005
