@@ -39,8 +39,6 @@ _POSTURE_SHARE = 0.25
 #: A far target pulls as hard as this many times the largest speed of the tip would take.
 _PULL = 4.0
 
-#: Largest violation of a row (in units of the largest step) at which a result is still taken.
-ACCEPTED_VIOLATION = 1e-3
 
 _TINY = 1e-12
 _INFINITY = 1e30
@@ -52,8 +50,8 @@ _SETTINGS = {
     "scaling": 0,
     "polishing": False,
     "warm_starting": True,
-    "eps_abs": 1e-4,
-    "eps_rel": 1e-4,
+    "eps_abs": 2e-5,
+    "eps_rel": 2e-5,
     "max_iter": 1000,
     "check_termination": 5,
 }

@@ -86,10 +86,13 @@ def _orientation_error(want: Parts, rotation: ca.SX) -> ca.SX:
     # Exactly the other way round every axis across is as good: the tip's own x.
     pointing = _angle_vector(across, along, rotation[:, 0])
     whole = want["rotation"] @ rotation.T
-    return want["rotation_follows"] * _rotation_vector(whole) + want["direction_follows"] * pointing
+    return (
+        want["rotation_follows"] * symbolic_rotation_vector(whole)
+        + want["direction_follows"] * pointing
+    )
 
 
-def _rotation_vector(rotation: ca.SX) -> ca.SX:
+def symbolic_rotation_vector(rotation: ca.SX) -> ca.SX:
     """Axis times angle (3,), rad; angles up to pi."""
     axial = 0.5 * ca.vertcat(
         rotation[2, 1] - rotation[1, 2],
