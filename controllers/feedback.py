@@ -14,9 +14,8 @@ from enum import Enum, auto
 import numpy as np
 
 from controllers.arm import Arm, Array
-from controllers.frames import rotation_from_vector
+from controllers.frames import rotation_from_vector, rotation_vector
 from controllers.prediction import Prediction
-from controllers.tasks.tip_pose import rotation_vector
 
 #: Time constant (s) by which the estimate follows the measured difference, and its scatter.
 _FAST_S, _SCATTER_S = 0.02, 0.5

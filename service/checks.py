@@ -8,13 +8,18 @@ from controllers.actuation import length_bounds_m
 from controllers.arm import Arm, Array
 from controllers.errors import TargetRejected
 from controllers.targets import (
+    DirectionTarget,
     LawName,
     LengthsTarget,
+    PointTarget,
     PoseTarget,
     PositionTarget,
+    PostureTarget,
     PressuresTarget,
     Target,
+    TasksTarget,
     TwistTarget,
+    WeightedTarget,
 )
 from logs.schema import pneuarm_pb2 as pb
 
@@ -26,6 +31,12 @@ FASTEST_M_S = 5.0
 FASTEST_RAD_S = 20.0
 
 _UNIT_TOLERANCE = 1e-3
+
+#: Weights count beside each other; beyond this the QP loses the digits of the others.
+_HEAVIEST = 1e3
+
+#: Tasks that ask for the same thing, so that only one of them can be meant.
+_CONTRADICTORY = (("position", "pose"), ("direction", "pose"))
 
 
 class TargetChecker:
@@ -56,8 +67,77 @@ class TargetChecker:
                 return LengthsTarget(self._lengths(message.lengths), law)
             case "pressures":
                 return PressuresTarget(self._pressures(message.pressures), law)
+            case "direction":
+                return DirectionTarget(_direction(message.direction), law)
+            case "point":
+                return self._point(message.point, law)
+            case "tasks":
+                return self._tasks(message.tasks, law)
         raise TargetRejected(
-            "the message holds no target; one of position, pose, twist, lengths, pressures"
+            "the message holds no target; one of position, pose, twist, lengths, pressures, "
+            "direction, point, tasks"
+        )
+
+    def _point(self, message: pb.PointTarget, law: LawName = LawName.DEFAULT) -> PointTarget:
+        _require(message, "position_m")
+        if not 0.0 < message.station <= 1.0:  # never true of a NaN
+            raise TargetRejected(
+                f"station = {message.station:g}; allowed: above 0 (the base) to 1 (the tip)"
+            )
+        position = self._position(message.frame_id, message.position_m)
+        along = message.station * self._arm.n_sections
+        shares = np.clip(along - np.arange(self._arm.n_sections), 0.0, 1.0)
+        longest = float(shares @ self._arm.per_section("length_max_m")[:, 0])
+        distance = float(np.linalg.norm(position))
+        if distance > longest:
+            raise TargetRejected(
+                f"position_m = {_list(position)} is {distance:.3g} m from the base, but the "
+                f"backbone at station {message.station:g} reaches at most {longest:.3g} m"
+            )
+        return PointTarget(position, message.station, law)
+
+    def _tasks(self, message: pb.TasksTarget, law: LawName) -> TasksTarget:
+        kinds = [task.WhichOneof("task") for task in message.tasks]
+        if not [kind for kind in kinds if kind not in (None, "posture")]:
+            raise TargetRejected("tasks holds no task besides posture; at least one is needed")
+        for kind in kinds:
+            if kinds.count(kind) > 1:
+                raise TargetRejected(
+                    f"tasks holds {kind or 'an empty task'} twice; once is allowed"
+                )
+        for one, other in _CONTRADICTORY:
+            if one in kinds and other in kinds:
+                raise TargetRejected(f"tasks holds {one} and {other}, which contradict; drop one")
+        if "position" in kinds + ["position"] * ("pose" in kinds) and any(
+            task.HasField("point") and task.point.station == 1.0 for task in message.tasks
+        ):
+            raise TargetRejected(
+                "tasks holds a point at station 1, the tip, besides the tip's position; drop one"
+            )
+        targets = tuple(self._task(task) for task in message.tasks)
+        return TasksTarget(targets, tuple(_weights(task) for task in message.tasks), law)
+
+    def _task(self, message: pb.WeightedTask) -> WeightedTarget:
+        """Check one of several tasks."""
+        match message.WhichOneof("task"):
+            case "position":
+                _require(message.position, "position_m")
+                position = message.position
+                return PositionTarget(self._position(position.frame_id, position.position_m))
+            case "pose":
+                _require(message.pose, "position_m", "orientation")
+                place = self._position(message.pose.frame_id, message.pose.position_m)
+                return PoseTarget(place, _quaternion(message.pose.orientation))
+            case "direction":
+                return DirectionTarget(_direction(message.direction))
+            case "point":
+                return self._point(message.point)
+            case "lengths":
+                return LengthsTarget(self._lengths(message.lengths))
+            case "posture":
+                return PostureTarget()
+        raise TargetRejected(
+            "an empty task; one of position, pose, direction, point, lengths, posture"
         )
 
     def tip_pose(self, message: PoseInFrame) -> tuple[Array, Array]:
@@ -145,6 +225,28 @@ def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:
     if in_tip_frame and about_base:
         raise TargetRejected("frame_id = 'tip' goes with reference_point = 'tip' only")
     return TwistTarget(linear, angular, in_tip_frame, about_base, law)
+
+
+def _direction(message: pb.DirectionTarget) -> Array:
+    _check_frame(message.frame_id, ("base",))
+    _require(message, "direction")
+    direction = _vector("direction", message.direction)
+    norm = float(np.linalg.norm(direction))
+    if not 1e-6 < norm < 1e6:
+        raise TargetRejected(f"direction = {_list(direction)} points nowhere; give a unit vector")
+    return direction / norm
+
+
+def _weights(message: pb.WeightedTask) -> tuple[float, float]:
+    for name in ("weight", "orientation_weight"):
+        weight = getattr(message, name)
+        left_out = name == "orientation_weight" and weight == 0.0
+        if not (0.0 < weight <= _HEAVIEST or left_out):
+            raise TargetRejected(
+                f"{name} of task {message.WhichOneof('task')} is {weight:g}; allowed: above 0 to "
+                f"{_HEAVIEST:g}; leave out a task that is not to count"
+            )
+    return message.weight, message.orientation_weight or message.weight
 
 
 def _require(message: Message, *names: str) -> None:

@@ -167,14 +167,19 @@ def _add_client(commands: Subparsers) -> None:
     kinds = send.add_subparsers(dest="kind", required=True, metavar="KIND")
     position = kinds.add_parser("position", help="tip position in the base frame, mm")
     pose = kinds.add_parser("pose", help="tip position, mm, and quaternion x y z w")
+    direction = kinds.add_parser("direction", help="where the tip points, in the base frame")
+    point = kinds.add_parser("point", help="a point of the backbone at a position, mm")
     twist = kinds.add_parser("twist", help="tip velocity, mm/s, for some seconds")
     # One name for all values: where some are missing, argparse cannot tell a tuple of names.
     for parser, count, names in (
         (position, 3, "X Y Z, mm"),
         (pose, 7, "X Y Z, mm, QX QY QZ QW"),
+        (direction, 3, "DX DY DZ"),
+        (point, 3, "X Y Z, mm"),
         (twist, 3, "VX VY VZ, mm/s"),
     ):
         parser.add_argument("values", nargs=count, type=float, metavar="VALUE", help=names)
+    point.add_argument("--station", type=float, required=True, help="0 the base, 1 the tip")
     twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")
     twist.add_argument("--frame", choices=("base", "tip"), default="base")
     twist.add_argument("--point", choices=("tip", "base"), default="tip", help="reference point")
@@ -183,7 +188,7 @@ def _add_client(commands: Subparsers) -> None:
     pressures = kinds.add_parser("pressures", help="gauge pressures, three a section, bar")
     for parser in (lengths, pressures):
         parser.add_argument("values", nargs="+", type=float, metavar="VALUE")
-    for parser in (position, pose, twist, lengths, pressures):
+    for parser in (position, pose, direction, point, twist, lengths, pressures):
         _add_connection(parser)
         parser.add_argument("--enable", action="store_true", help="arm first")
         parser.add_argument("--take-over", action="store_true", help="take the lease from another")

@@ -12,7 +12,13 @@ from controllers.errors import DaemonUnreachable, ModeRefused, NotConfirmed
 from logs.schema import pneuarm_pb2 as pb
 from service.client import Client
 from service.local_stop import stop_locally
-from service.target_messages import pose_target, position_target, twist_target
+from service.target_messages import (
+    direction_target,
+    point_target,
+    pose_target,
+    position_target,
+    twist_target,
+)
 from service.text import outcome, radians, state_line
 
 _LAWS = {None: pb.DEFAULT, "resolved_rate": pb.RESOLVED_RATE, "qp_ik": pb.QP_IK}
@@ -40,6 +46,10 @@ def target_of(arguments: argparse.Namespace) -> pb.Target:
             return position_target([1e-3 * value for value in values], law)
         case "pose":
             return pose_target([1e-3 * value for value in values[:3]], values[3:], law)
+        case "direction":
+            return direction_target(values, law)
+        case "point":
+            return point_target([1e-3 * value for value in values], arguments.station, law)
         case "twist":
             linear = [1e-3 * value for value in values]
             angular = radians(arguments.angular)

@@ -17,6 +17,7 @@ from platformdirs import user_state_path
 from pydantic import BaseModel, ValidationError, model_validator
 
 from controllers.arm import Arm
+from controllers.consistency import refuse_contradictions
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
@@ -104,7 +105,7 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
     """Check tables as a file has them; raises ConfigurationError."""
     try:
         configuration = Configuration.model_validate(tables)
-        configuration.build_arm()
+        refuse_contradictions(configuration.build_arm())
     except ValidationError as error:
         items = error.errors()
         if len(items) > 1:  # a list counts as short because its elements were refused: no news

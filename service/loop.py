@@ -46,6 +46,9 @@ _GUARD_COUNTS = tuple(
     (int(kind), f"guard_{kind.name.lower()}") for kind in Intervention if kind.name
 )
 
+#: What may happen in every tick is told this often at most.
+_TELL_EVERY_NS = 10_000_000_000
+
 
 @dataclass(frozen=True)
 class LoopSettings:
@@ -106,6 +109,7 @@ class Loop:
         self._heartbeat_ns: int | None = None
         self._operator = False
         self._interventions = 0
+        self._told_fallbacks = self._tell_again_ns = 0
         self._now_ns = self._last_ns = settings.start_ns
         self.sequence = 0
 
@@ -267,6 +271,7 @@ class Loop:
         """Return the pressures wanted now, by mode."""
         if self._keeper.mode == Mode.ACTIVE:
             self._wanted = self._steering.step(dt_s)
+            self._tell_fallbacks()
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
             dither_pa = self._steering.dither_pa(now_s)
             if not dither_pa:
@@ -277,6 +282,17 @@ class Loop:
         if ramping is not None:
             return ramping
         return self._sent  # hold keeps the last; in the vented modes it is zero already
+
+    def _tell_fallbacks(self) -> None:
+        """Tell that the QP gave nothing and the damped law went on, once in a while."""
+        count, now_ns = self._controller.fallbacks, self._now_ns
+        if count > self._told_fallbacks and now_ns >= self._tell_again_ns:
+            self._keeper.tell(
+                pb.WARNING,
+                "qp_fallback",
+                f"the QP gave no usable step, the damped law went on instead; {count} times so far",
+            )
+            self._told_fallbacks, self._tell_again_ns = count, now_ns + _TELL_EVERY_NS
 
     def _send(self, wanted: Array, now_s: float) -> None:
         ramping = self._safety.ramping_pa(now_s) is not None

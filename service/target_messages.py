@@ -31,6 +31,18 @@ def pose_target(
     return pb.Target(pose=pose, law=law)
 
 
+def direction_target(direction: Vector, law: "pb.Law" = pb.DEFAULT) -> pb.Target:
+    """Make a target: the tip pointing along a direction (3,) in the base frame."""
+    wanted = pb.DirectionTarget(frame_id="base", direction=_vector(direction))
+    return pb.Target(direction=wanted, law=law)
+
+
+def point_target(position_m: Vector, station: float, law: "pb.Law" = pb.DEFAULT) -> pb.Target:
+    """Make a target: the backbone's point at a station (0 to 1) at a position (3,), m."""
+    point = pb.PointTarget(frame_id="base", position_m=_vector(position_m), station=station)
+    return pb.Target(point=point, law=law)
+
+
 def twist_target(
     linear_m_s: Vector,
     angular_rad_s: Vector | None,

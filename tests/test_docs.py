@@ -26,6 +26,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "`[arm]`": arm.ArmConfig,
     "`[arm.response]`": arm.ResponseConfig,
     "`[[arm.sections]]`": arm.SectionConfig,
+    "`[[arm.keep_outs]]`": arm.KeepOutConfig,
     "`[control]`": control.ControlConfig,
     "`[hardware]`": hardware.HardwareConfig,
     "`[monitors]`": monitors.MonitorsConfig,

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.arm import Arm, Array
-from controllers.controller import Binding
+from controllers.errors import InvalidInput
 from controllers.kinematics.constant_curvature import lengths_from_shapes, section_inverse
 from controllers.kinematics.reachability import LimitNames, Reachability, checked_positions
 from controllers.kinematics.workspace_nearest import BoundarySearch
 from controllers.kinematics.workspace_region import ROUNDING_M, SectionRegion
 from controllers.kinematics.workspace_search import SearchedRegion
-from controllers.law import AT_BOUND_M
+from controllers.law import AT_BOUND_M, Limits
+from controllers.reach import Binding
 
 
 class Region(Protocol):
@@ -49,7 +50,7 @@ class SolvedRegion:
         if self.region.contains(position_m):
             return Reachability(True, Binding.NOTHING, position_m.copy(), 0.0)
         nearest = self.boundary.nearest_m(position_m)
-        limits = self.region.limits.within(self._lengths_m(nearest), AT_BOUND_M)
+        limits = self.region.limits.within(self.lengths_m(nearest), AT_BOUND_M)
         distance = float(np.linalg.norm(position_m - nearest))
         return Reachability(False, limits, nearest, distance)
 
@@ -57,9 +58,10 @@ class SolvedRegion:
         """Limits that the one arc to a position (3,) exceeds; LENGTH where no arc ends."""
         if position_m[0] == position_m[1] == 0.0 and position_m[2] <= 0.0:
             return Binding.LENGTH
-        return self.region.limits.within(self._lengths_m(position_m), -ROUNDING_M)
+        return self.region.limits.within(self.lengths_m(position_m), -ROUNDING_M)
 
-    def _lengths_m(self, position_m: Array) -> Array:
+    def lengths_m(self, position_m: Array) -> Array:
+        """Lengths (1, 3) of the one arc to a position (3,)."""
         return lengths_from_shapes(section_inverse(position_m), self.region.offset_m)[None]
 
 
@@ -89,3 +91,12 @@ class Workspace:
     def contains(self, positions_m: object) -> NDArray[np.bool_]:
         """Say for positions ``(..., 3)`` whether the tip can be there; raises InvalidInput."""
         return self.region.contains(checked_positions(positions_m, single=False))
+
+    def lengths_m(self, position_m: Array) -> Array:
+        """Lengths (1, 3) of one section whose tip is at a reachable position (3,), within limits.
+
+        Raises InvalidInput for an arm of several sections: there a position has many.
+        """
+        if not isinstance(self.region, SolvedRegion):
+            raise InvalidInput(f"arm {self.arm.name!r} has {self.arm.n_sections} sections, not 1")
+        return Limits(self.arm).clip(self.region.lengths_m(position_m))
