@@ -95,7 +95,7 @@ class Controller:
         The result's arrays are reused by the next call. A duration that is no positive number
         moves nothing.
         """
-        if not dt_s > 0.0:
+        if not 0.0 < dt_s < np.inf:
             return self._motion.tip
         law = None if self._target is None else self._laws[self.law_name]
         self._motion.step(law, dt_s)
