@@ -54,7 +54,7 @@ class Configuration(Table):
 
     def to_toml(self) -> str:
         """Return the effective configuration as a file that gives it again."""
-        return tomli_w.dumps(self.model_dump(mode="python"))
+        return tomli_w.dumps(self.model_dump(mode="python", exclude_none=True))
 
 
 def log_directory(configuration: Configuration) -> Path:
