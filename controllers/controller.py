@@ -121,7 +121,7 @@ class Controller:
 
         A duration that is no positive number moves nothing.
         """
-        if not dt_s > 0.0:
+        if not 0.0 < dt_s < np.inf:
             return self.tip()
         law = None if self._target is None else self._laws[self.law_name]
         self._motion.step(law, dt_s)

@@ -85,6 +85,15 @@ class BindingLimits:
         pressures = self._pressure_map.pressures_pa(lengths_m)
         if ((pressures < self._low_pa) | (pressures > self._high_pa)).any():
             binding |= Binding.PRESSURE
-        if self._keep_outs and (self._limits.keep_out.left_m(lengths_m) < AT_BOUND_M).any():
+        if (
+            self._keep_outs
+            and (
+                self._limits.keep_out.left_m(lengths_m) < 2.0 * self._limits.keep_out.margin_m
+            ).any()
+        ):
             binding |= Binding.KEEP_OUT
         return binding
+
+    def _at_keep_out(self, lengths_m: Array) -> bool:
+        limit = self._limits.keep_out
+        return bool((limit.left_m(lengths_m) < 2.0 * limit.margin_m).any())

@@ -53,7 +53,7 @@ class SafeStep:
         slowed = self._slowed(lengths, wish, dt, want, jacobian.T, checks[2])
         after = self._rates(rates, slowed, dt, share)
         moved = lengths + dt * after
-        slack = self._slack(lengths, moved, after, dt)
+        slack = self._slack(lengths, moved, after, dt, share)
         rows = symbolic_rows(arm, moved, want, whole)
         self.function = CompiledFunction(
             "safe_step",
@@ -131,12 +131,19 @@ class SafeStep:
         """All chambers slowed down by one share, the most that the acceleration allows."""
         return rates * ca.fmax(0.0, 1.0 - dt / (self._stopping_time(rates) + _TINY))
 
-    def _slack(self, before: ca.SX, moved: ca.SX, rates: ca.SX, dt: ca.SX) -> ca.SX:
-        """The least that is left of any limit, in metres; NaN if any of it is."""
+    def _slack(self, before: ca.SX, moved: ca.SX, rates: ca.SX, dt: ca.SX, share: ca.SX) -> ca.SX:
+        """The least that is left of any limit, in metres; NaN if any of it is.
+
+        What is no convex set is looked at in places, so braking needs room for what lies between.
+        """
         stop = moved + rates * (0.5 * self._stopping_time(rates))
         places = [moved, 0.5 * (moved + stop), stop]
         slacks = [limit.slack(stop) for limit in self._limits.convex]
-        slacks += [limit.slack(place) for limit in self._limits.others for place in places]
+        slacks += [
+            limit.slack(place) - 0.5 * limit.margin_m * (share > 0.0)
+            for limit in self._limits.others
+            for place in places
+        ]
         slacks.append(self._limits.pressure.slew_slack(before, moved, dt))
         every = ca.vertcat(*slacks)
         return ca.mmin(every) + 0.0 * ca.sum1(every)  # the minimum itself would drop a NaN

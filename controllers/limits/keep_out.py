@@ -22,7 +22,7 @@ class KeepOutLimit:
     (at most ``L theta / (8 PIECES^2)``, below 2 mm) is taken away: never less than the truth.
     """
 
-    margin_m = 1e-5
+    margin_m = 1e-4
 
     def __init__(self, arm: Arm) -> None:
         self._arm = arm

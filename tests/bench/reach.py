@@ -65,7 +65,7 @@ class Watch:
         if self._limits.curved[1:]:
             left["keep_out"] = self._limits.keep_out.left_m(lengths).min() + 1e-13
         self.violations += min(left.values()) < 0.0
-        near = {"length": 2e-5, "bend": 2e-5, "pressure": 2e-5, "keep_out": 2e-4}
+        near = {"length": 2e-5, "bend": 2e-5, "pressure": 2e-5, "keep_out": 3e-4}
         self.touched |= {name for name, value in left.items() if value < near.get(name, 1e-2)}
         self._lengths, self._rates = lengths, rates
         self.steps += 1
