@@ -50,7 +50,7 @@ class SolvedRegion:
         if self.region.contains(position_m):
             return Reachability(True, Binding.NOTHING, position_m.copy(), 0.0)
         nearest = self.boundary.nearest_m(position_m)
-        limits = self.region.limits.within(self.lengths_m(nearest), AT_BOUND_M)
+        limits = self.region.limits.within(self._lengths_m(nearest), AT_BOUND_M)
         distance = float(np.linalg.norm(position_m - nearest))
         return Reachability(False, limits, nearest, distance)
 
@@ -58,10 +58,9 @@ class SolvedRegion:
         """Limits that the one arc to a position (3,) exceeds; LENGTH where no arc ends."""
         if position_m[0] == position_m[1] == 0.0 and position_m[2] <= 0.0:
             return Binding.LENGTH
-        return self.region.limits.within(self.lengths_m(position_m), -ROUNDING_M)
+        return self.region.limits.within(self._lengths_m(position_m), -ROUNDING_M)
 
-    def lengths_m(self, position_m: Array) -> Array:
-        """Lengths (1, 3) of the one arc to a position (3,)."""
+    def _lengths_m(self, position_m: Array) -> Array:
         return lengths_from_shapes(section_inverse(position_m), self.region.offset_m)[None]
 
 
@@ -99,4 +98,5 @@ class Workspace:
         """
         if not isinstance(self.region, SolvedRegion):
             raise InvalidInput(f"arm {self.arm.name!r} has {self.arm.n_sections} sections, not 1")
-        return Limits(self.arm).clip(self.region.lengths_m(position_m))
+        exact = lengths_from_shapes(section_inverse(position_m), self.region.region.offset_m)
+        return Limits(self.arm).clip(exact[None])
