@@ -35,6 +35,7 @@ from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
 from service.monitors.settings import MonitorSettings
+from service.monitors.watch import measurement_age_s
 from service.safety import Safety
 from service.steering import Steering
 
@@ -331,8 +332,7 @@ class Loop:
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
         tick["supply_pa"] = measurement.supply_pa
-        taken_s = measurement.taken_s
-        tick["measurement_age_s"] = 0.0 if taken_s is None else self._now_ns * 1e-9 - taken_s
+        tick["measurement_age_s"] = measurement_age_s(measurement, self._now_ns * 1e-9)
         self._fill_estimate(measurement)
         self._fill_target()
         if measurement.true_tip is not None:
