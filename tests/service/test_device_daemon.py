@@ -4,12 +4,15 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from controllers.errors import ModeRefused
 from logs.schema import pneuarm_pb2 as pb
+from pneuarm import Client
 from tests.service.daemon import (
     Daemon,
     arm,
@@ -46,16 +49,24 @@ def move(daemon: Daemon, emulator: Emulator, seconds: float = 0.5) -> None:
         assert emulator.zero_since() is None
 
 
+def is_ready_after_reset(client: Client) -> bool:
+    """Ask for a reset where one is due; it may come too early, and then is due again."""
+    mode = client.state().mode
+    if mode == pb.FAULT:
+        with suppress(ModeRefused):
+            client.reset()
+    return mode == pb.READY
+
+
 def fault_and_reset(daemon: Daemon, emulator: Emulator, words: str) -> None:
     """See a latched fault with the cause in it, zeros at the terminal, and be ready again."""
     with daemon.client() as client:
         wait_for(lambda: client.state().mode == pb.FAULT, "a fault")
         wait_for(emulator.zero_since, "zeros at the terminal")
         assert any(words in event.cause + event.text for event in client.events())
-    # Nothing re-arms by itself, and it is ready only through a reset.
-    wait_for(lambda: daemon.command("reset").returncode == 0, "the reset to be taken")
+    # Nothing re-arms by itself, and it is ready only through a reset, with the cause gone.
     with daemon.client() as client:
-        wait_for(lambda: client.state().mode == pb.READY, "the arm to be ready again")
+        wait_for(lambda: is_ready_after_reset(client), "the arm to be ready again")
     assert emulator.zero_since() is not None
 
 
