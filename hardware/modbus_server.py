@@ -16,7 +16,7 @@ from pymodbus.pdu.register_message import (
 from hardware.transport_faults import TransportFaults
 
 _ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _BUSY = 1, 2, 6
-_STEP_S = 0.005
+_STEP_S = 0.01
 
 
 class EmulatedTerminal(Protocol):
