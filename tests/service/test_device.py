@@ -27,6 +27,7 @@ def configuration_for(port: int) -> Configuration:
     tables = load(None, "paper").model_dump()
     tables["hardware"] = {"adapter": "festo-cpx"}
     tables["festo_cpx"] = {"host": "127.0.0.1", "port": port, "valve_range": "vacuum"}
+    tables["festo_cpx"] |= {"timeout_ms": 150.0, "watchdog_ms": 400}
     return check(tables)
 
 
