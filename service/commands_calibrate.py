@@ -10,7 +10,7 @@ from typing import Any
 from controllers.calibration.calibrate import Calibration, calibrate
 from controllers.calibration.plan import duration_s, plan
 from controllers.calibration.recording import Recording
-from service.calibration.drive import progress, record
+from service.calibration.drive import progress, record, require_tip
 from service.calibration.files import require_folder, toml_text, write_whole
 from service.calibration.page import page
 from service.calibration.recordings import read_logs, require_seen
@@ -44,6 +44,7 @@ def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
         configuration = check(tomllib.loads(client.info().config_toml), "the daemon")
         arm = configuration.build_arm()
         moves = plan(arm)
+        require_tip(client)
         print(
             f"arm {name} moves through {len(moves)} places in {duration_s(moves):.0f} s; keep its "
             "workspace free; Ctrl-C ends it with the arm vented",
