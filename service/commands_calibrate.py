@@ -28,7 +28,6 @@ def run(arguments: argparse.Namespace) -> int:
     configuration, recording = (
         read_logs(arguments.from_logs, arguments.arm) if arguments.from_logs else _live(arguments)
     )
-    require_seen(recording)
     print("fitting ...", file=sys.stderr, flush=True)
     found = calibrate(configuration.build_arm(), recording, arguments.world)
     text = toml_text(configuration, found)
@@ -51,7 +50,9 @@ def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
             file=sys.stderr,
             flush=True,
         )
-        return configuration, record(client, moves, arm.n_sections, progress())
+        recording = record(client, moves, arm.n_sections, progress())
+    require_seen(recording)
+    return configuration, recording
 
 
 def _tell(arguments: argparse.Namespace, found: Calibration, folder: Path) -> None:
