@@ -8,6 +8,7 @@ themselves are in :mod:`service.tables`.
 
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -16,7 +17,7 @@ import tomli_w
 from platformdirs import user_state_path
 from pydantic import BaseModel, ValidationError, model_validator
 
-from controllers.arm import Arm
+from controllers.arm import Arm, uncalibrated
 from controllers.consistency import refuse_contradictions
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
@@ -63,8 +64,13 @@ class Configuration(Table):
         return self.arm.build()
 
     def build_simulated_arm(self) -> Arm:
-        """Return the arm that the simulator makes real: ``arm`` where nothing else is said."""
-        return (self.simulator.arm or self.arm).build()
+        """Return the arm that the simulator makes real: ``arm`` where nothing else is said.
+
+        Its body has weight, stiffness and hysteresis of its own: those of a calibration are left
+        out.
+        """
+        arm = (self.simulator.arm or self.arm).build()
+        return replace(arm, sections=tuple(uncalibrated(section) for section in arm.sections))
 
     @property
     def device_address(self) -> str:
