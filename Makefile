@@ -2,11 +2,12 @@
 
 PYTHON ?= python3
 SECONDS ?= 30
+TIMES ?= 30
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo test check validate bench-setup proto lock clean
+.PHONY: setup demo faults test check validate bench-setup proto lock clean
 
 setup: $(READY)
 
@@ -19,6 +20,10 @@ $(READY): requirements.lock pyproject.toml
 
 demo: setup
 	@$(BIN)/pneuarm demo --seconds $(SECONDS)
+
+# Every fault that docs/safety.md names, TIMES times at random moments; writes its table there.
+faults: setup
+	$(BIN)/python -m tests.faults --times $(TIMES) --write docs/safety.md
 
 test: check
 	$(BIN)/pytest

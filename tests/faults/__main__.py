@@ -6,7 +6,13 @@ import sys
 import time
 from pathlib import Path
 
-from tests.faults import client_faults, machine_faults, process_faults, wire_faults
+from tests.faults import (
+    client_faults,
+    device_faults,
+    machine_faults,
+    process_faults,
+    wire_faults,
+)
 from tests.faults.campaign import run_campaign, tell
 from tests.faults.fault import Fault
 from tests.faults.report import Report, write_page
@@ -17,6 +23,7 @@ FAULTS: tuple[Fault, ...] = (
     *client_faults.FAULTS,
     *wire_faults.FAULTS,
     *machine_faults.FAULTS,
+    *device_faults.FAULTS,
 )
 
 
@@ -63,7 +70,13 @@ def _parse() -> argparse.Namespace:
 
 
 def _chosen(names: list[str] | None) -> list[Fault]:
-    return [f for f in FAULTS if not names or any(name in f.name for name in names)]
+    """Return the faults that are meant: a whole name means that one, a part all that have it."""
+    if not names:
+        return list(FAULTS)
+    whole = {fault.name for fault in FAULTS}
+    return [
+        f for f in FAULTS if any(n == f.name or (n in f.name and n not in whole) for n in names)
+    ]
 
 
 if __name__ == "__main__":

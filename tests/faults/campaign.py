@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from controllers.arm import Arm
 from service.config import load
 from tests.faults.clock import settable_clock
+from tests.faults.device_audit import audit_device
 from tests.faults.fault import Fault, Injection, Row
 from tests.faults.log_audit import audit_log
 from tests.faults.rig import Rig
@@ -65,7 +67,8 @@ class FaultRun:
         except _FAILED as error:
             if injection not in self.row.injections:
                 self.row.injections.append(injection)
-            injection.check("the policy", False, f"{type(error).__name__}: {error}")
+            said = self._rig.last_words() if self._rig is not None else ""
+            injection.check("the policy", False, f"{type(error).__name__}: {error}{said}")
             self._end_badly()
         injection.end()
         tell("!" if injection.broken else ".", end="")
@@ -78,7 +81,7 @@ class FaultRun:
             if self._fault.clock:
                 folder = self._open.enter_context(tempfile.TemporaryDirectory())
                 self._open.enter_context(settable_clock(Path(folder)))
-            self._rig = self._open.enter_context(Rig(self._fault.tables))
+            self._rig = self._open.enter_context(Rig(self._fault.tables, self._fault.device))
         self._rig.move()
         return self._rig
 
@@ -112,9 +115,11 @@ class FaultRun:
         self._unaudited = []
         self._open.close()
 
-    def _audit(self, rig: Rig, arm: object) -> None:
+    def _audit(self, rig: Rig, arm: Arm) -> None:
         path = rig.log_path()
-        audit_log(path, rig.offset_ns, arm, self._unaudited)  # type: ignore[arg-type]
+        audit_log(path, rig.offset_ns, arm, self._unaudited, rig.emulator is not None)
+        if rig.emulator is not None:
+            audit_device(rig.emulator.record, arm, self._unaudited)
 
 
 def run_campaign(faults: list[Fault], times: int, seed: int) -> Iterator[Row]:

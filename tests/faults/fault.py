@@ -20,7 +20,8 @@ class Injection:
     that tells of it; ``allowed`` are those in which the arm may be until ``until_ns``.
     ``held_after_s`` is the target's timeout where the arm has to hold for want of targets,
     ``logged_until_s`` how much of its end the log may lack, ``only_targets_of`` whose targets
-    alone may have been accepted.
+    alone may have been accepted. ``zero_within_s`` is the time in which the
+    device has to be zeroed, by its own record.
     """
 
     fault: str
@@ -32,11 +33,13 @@ class Injection:
     safe: frozenset[int] = frozenset()
     allowed: frozenset[int] = frozenset()
     safe_s: float | None = None
+    empty_s: float | None = None
     within_s: float | None = None
     event: str = ""
     held_after_s: float | None = None
     logged_until_s: float | None = None
     only_targets_of: str = ""
+    zero_within_s: float | None = None
     kept: int = 0
     broken: list[str] = field(default_factory=list)
     figures: dict[str, float] = field(default_factory=dict)
@@ -107,3 +110,8 @@ class Row:
     def times_s(self) -> list[float]:
         """Times to the safe state, s."""
         return sorted(i.safe_s for i in self.injections if i.safe_s is not None)
+
+    @property
+    def empty_s(self) -> list[float]:
+        """Times until the chambers behind an emulated device were empty, s."""
+        return [i.empty_s for i in self.injections if i.empty_s is not None]

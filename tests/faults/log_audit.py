@@ -61,14 +61,19 @@ def read_session(path: Path, offset_ns: int) -> Session:
     )
 
 
-def audit_log(path: Path, offset_ns: int, arm: Arm, injections: list[Injection]) -> Session | None:
-    """Judge every injection by the log of its session; the windows together cover all of it."""
+def audit_log(
+    path: Path, offset_ns: int, arm: Arm, injections: list[Injection], device: bool
+) -> None:
+    """Judge every injection by the log of its session; the windows together cover all of it.
+
+    ``device`` says that the pressures are judged by a device's own record instead.
+    """
     try:
         session = read_session(path, offset_ns)
     except PneuarmError as error:
         for injection in injections:
             injection.check("the log is readable", False, str(error))
-        return None
+        return
     begin_ns = 0
     for index, injection in enumerate(injections):
         last = index == len(injections) - 1
@@ -76,16 +81,16 @@ def audit_log(path: Path, offset_ns: int, arm: Arm, injections: list[Injection])
         inside = (session.time_ns >= begin_ns) & (session.time_ns < end_ns)
         injection.check("the log is readable", bool(inside.any()), "no tick of this time in it")
         if inside.any():
-            _audit(session, np.flatnonzero(inside), arm, injection)
+            # One tick more at the beginning, so that no step between two windows goes unseen.
+            rows = np.arange(max(0, np.flatnonzero(inside)[0] - 1), np.flatnonzero(inside)[-1] + 1)
+            if not device:
+                _check_pressures(session, rows, arm, injection)
+            _audit(session, rows, arm, injection)
         begin_ns = end_ns
-    return session
 
 
 def _audit(session: Session, rows: np.ndarray, arm: Arm, injection: Injection) -> None:
-    # One tick more at the beginning, so that no step between two windows goes unseen.
-    rows = np.arange(max(0, rows[0] - 1), rows[-1] + 1)
     _check_ticks(session, rows, injection)
-    _check_pressures(session, rows, arm, injection)
     low = arm.per_chamber("length_min_m").reshape(-1)
     high = arm.per_chamber("length_max_m").reshape(-1)
     lengths = session.lengths_m[rows]
@@ -138,7 +143,8 @@ def _check_end(session: Session, injection: Injection) -> None:
         injection.check(f"the event {injection.event}", event is not None)
         if event is not None:
             at_ns = event.time_unix_ns - session.offset_ns
-            injection.safe_s = (at_ns - injection.begin_ns) * 1e-9
+            if injection.zero_within_s is None:
+                injection.safe_s = (at_ns - injection.begin_ns) * 1e-9
     if injection.logged_until_s is not None:
         lacks_s = (injection.begin_ns - session.time_ns.max()) * 1e-9
         limit_s = injection.logged_until_s

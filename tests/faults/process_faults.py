@@ -6,19 +6,18 @@ from collections.abc import Callable
 
 from logs.schema import pneuarm_pb2 as pb
 from service.mode_keeper import GATEWAY_LOST_S, GATEWAY_SILENT_S
+from tests.faults.device_faults import ZERO_S
 from tests.faults.fault import Fault, Injection
 from tests.faults.rig import Rig
 from tests.service.daemon import enough
 
 _VIEWED = {"rerun": {"enabled": True, "memory_limit_mib": 32}}
 
-#: What the daemon needs beside a timeout: to notice (its own period), and to act.
-_NOTICE_S = 0.1
-
 
 def _control(number: int) -> Callable[[Rig, Injection], None]:
     def inject(rig: Rig, injection: Injection) -> None:
         control = rig.pid("control")
+        injection.zero_within_s = ZERO_S
         injection.begin()
         os.kill(control, number)
         rig.wait_for_end(injection, 3)
@@ -28,10 +27,35 @@ def _control(number: int) -> Callable[[Rig, Injection], None]:
 
 
 def _supervisor_killed(rig: Rig, injection: Injection) -> None:
-    injection.must_reach(pb.IDLE, pb.READY, within_s=_NOTICE_S)
+    injection.must_reach(pb.IDLE, pb.READY)
+    injection.zero_within_s = ZERO_S
     injection.begin()
     rig.daemon.send_signal(signal.SIGKILL)
     rig.wait_for_end(injection, -signal.SIGKILL)
+
+
+def _supervisor_and_control_killed(rig: Rig, injection: Injection) -> None:
+    control = rig.pid("control")
+    injection.zero_within_s = ZERO_S
+    injection.begin()
+    rig.daemon.send_signal(signal.SIGKILL)
+    os.kill(control, signal.SIGKILL)
+    rig.wait_for_end(injection, -signal.SIGKILL)
+
+
+def _device(number: int) -> Callable[[Rig, Injection], None]:
+    """Control goes on without its device: fault; the supervisor zeroes it, and starts another."""
+
+    def inject(rig: Rig, injection: Injection) -> None:
+        device = rig.pid("device")
+        injection.must_reach(pb.FAULT, within_s=0.6)
+        injection.zero_within_s = ZERO_S
+        injection.begin()
+        os.kill(device, number)
+        rig.wait_until(lambda: rig.pid("device") != device, "another device process")
+        rig.wait_for_mode(pb.FAULT)
+
+    return inject
 
 
 def _supervisor_stopped(rig: Rig, injection: Injection) -> None:
@@ -47,6 +71,7 @@ def _supervisor_stopped(rig: Rig, injection: Injection) -> None:
 
 
 def _all_killed(rig: Rig, injection: Injection) -> None:
+    injection.zero_within_s = ZERO_S
     injection.begin()
     rig.daemon.send_signal_to_all(signal.SIGKILL)
     rig.wait_for_end(injection, -signal.SIGKILL)
@@ -92,15 +117,29 @@ def _outsider(name: str, number: int) -> Callable[[Rig, Injection], None]:
     return inject
 
 
-_ENDS = "vented by the supervisor, which ends the daemon with status 3"
+_CPX = "festo-cpx"
+_ENDS = "zeroed by the supervisor, which ends the daemon with status 3"
 _GOES_ON = "goes on, and nothing is missing in the log"
 
 FAULTS = (
-    Fault("control killed", _ENDS, _control(signal.SIGKILL)),
-    Fault("control stopped", _ENDS, _control(signal.SIGSTOP)),
-    Fault("supervisor killed", "control vents and ends", _supervisor_killed),
+    Fault("control killed", _ENDS, _control(signal.SIGKILL), device=_CPX),
+    Fault("control stopped", _ENDS, _control(signal.SIGSTOP), device=_CPX),
+    Fault("supervisor killed", "control vents, all end", _supervisor_killed, device=_CPX),
+    Fault(
+        "supervisor and control killed",
+        "zeroed by the device process or by the terminal's watchdog",
+        _supervisor_and_control_killed,
+        device=_CPX,
+    ),
+    Fault(
+        "all killed at once",
+        "zeroed by the terminal's watchdog; the log is readable to 1 s before",
+        _all_killed,
+        device=_CPX,
+    ),
+    Fault("device killed", "fault, zeroed by the supervisor", _device(signal.SIGKILL), device=_CPX),
+    Fault("device stopped", "fault, zeroed", _device(signal.SIGSTOP), device=_CPX),
     Fault("supervisor stopped", "goes on; the network stops it", _supervisor_stopped),
-    Fault("all killed at once", "the log is readable to 1 s before", _all_killed),
     Fault("gateway killed", "holds within 200 ms", _gateway_killed),
     Fault("gateway stopped", "holds within 200 ms, vents after 2 s", _gateway_stopped),
     Fault("recorder killed", _GOES_ON, _outsider("recorder", signal.SIGKILL)),

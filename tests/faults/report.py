@@ -37,14 +37,16 @@ class Report:
     def table(self) -> str:
         """One row a fault, as Markdown."""
         lines = [
-            "| fault | the arm | times | invariants kept | to the safe state, median | worst |",
-            "|---|---|---|---|---|---|",
+            "| fault | the arm | times | invariants kept | to the safe state, median | worst "
+            "| chambers below 10 mbar, median | worst |",
+            "|---|---|---|---|---|---|---|---|",
         ]
         for row in self.rows:
             kept = sum(i.kept for i in row.injections)
             checks = sum(i.checks for i in row.injections)
             cells = [row.fault.name, row.fault.policy, f"{len(row.injections)}"]
-            cells += [row.unable or f"{kept} of {checks}", *_times(row)]
+            cells += [row.unable or f"{kept} of {checks}"]
+            cells += [*_times(row.times_s), *_times(row.empty_s)]
             lines.append(f"| {' | '.join(cells)} |")
         return "\n".join(lines)
 
@@ -57,7 +59,8 @@ class Report:
             f"{self.seed}, {len(self.broken)} invariants broken.",
             self.table(),
         ]
-        text += [figure for row in self.rows if (figure := figures(row))]
+        if lines := [f"- {line}" for row in self.rows if (line := figures(row))]:
+            text.append("\n".join(lines))
         if self.stop:
             text.append(self.stop.text())
         if self.broken:
@@ -88,11 +91,11 @@ class Report:
         }
 
 
-def _times(row: Row) -> list[str]:
-    times = row.times_s
-    if not times:
+def _times(times_s: list[float]) -> list[str]:
+    """Median and worst, for two cells; empty where there is none."""
+    if not times_s:
         return ["", ""]
-    return [f"{1e3 * statistics.median(times):.0f} ms", f"{1e3 * times[-1]:.0f} ms"]
+    return [f"{1e3 * statistics.median(times_s):.0f} ms", f"{1e3 * max(times_s):.0f} ms"]
 
 
 def figures(row: Row) -> str:
@@ -102,8 +105,11 @@ def figures(row: Row) -> str:
     for name in names:
         values = [i.figures[name] for i in row.injections if name in i.figures]
         label, scale, unit = _label(name)
+        if unit == "":
+            parts.append(f"{label} {sum(values):.0f} times of {len(values)}")
+            continue
         median, largest = statistics.median(values) * scale, max(values) * scale
-        total = f", {sum(values):.0f} in all" if name == "payloads" else ""
+        total = f", {sum(values):.0f} in all" if unit == " of them" else ""
         parts.append(f"{label} {median:.3g}{unit} (largest {largest:.3g}{unit}{total})")
     return f"{row.fault.name}: {'; '.join(parts)}." if parts else ""
 
@@ -115,8 +121,10 @@ def _label(name: str) -> tuple[str, float, str]:
         "ms": (1.0, " ms"),
         "hz": (1.0, " a second"),
         "bytes": (1 / 2**20, " MiB"),
-    }.get(unit, (1.0, ""))
-    return (words.replace("_", " ") if shown else name), scale, shown
+        "number": (1.0, " of them"),
+        "times": (1.0, ""),
+    }[unit]
+    return words.replace("_", " "), scale, shown
 
 
 def write_page(page: Path, text: str) -> None:

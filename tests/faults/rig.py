@@ -2,11 +2,7 @@
 
 import contextlib
 import os
-import queue
-import subprocess
-import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,11 +12,16 @@ from typing import Any, TypeVar
 from controllers.errors import PneuarmError
 from logs.schema import pneuarm_pb2 as pb
 from pneuarm import Client
-from service.loop import NEAR_ZERO_PA
+from service.config import load
+from tests.faults.emulator import EMPTY_PA, Emulator, read_record
 from tests.faults.fault import Injection
-from tests.service.daemon import ROOT, Daemon, health_of, wait_for
+from tests.faults.program import Program
+from tests.service.daemon import Daemon, health_of, wait_for
 
 T = TypeVar("T")
+
+#: After its daemon has ended an emulated arm is given so long to lose its air, s.
+EMPTIES_S = 0.8
 
 #: Small and quick: the target's timeout is the daemon's own, a full disk vents soon.
 TABLES: dict[str, dict[str, Any]] = {
@@ -29,63 +30,19 @@ TABLES: dict[str, dict[str, Any]] = {
 }
 
 
-class Program:
-    """A program of ours beside the daemon, that takes words and says lines."""
-
-    def __init__(self, module: str, *arguments: str) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", module, *arguments],
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-            process_group=0,
-        )
-        self._lines: queue.Queue[str] = queue.Queue()
-        threading.Thread(target=self._listen, daemon=True).start()
-
-    def _listen(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            self._lines.put(line.strip())
-
-    def tell(self, words: str) -> None:
-        """Write one line to it."""
-        assert self.process.stdin is not None
-        with contextlib.suppress(OSError):
-            self.process.stdin.write(words + "\n")
-
-    def hear(self, begins: str, patience_s: float = 25.0) -> str:
-        """Wait for a line that begins so; return the rest of it."""
-        until = time.monotonic() + patience_s
-        while time.monotonic() < until:
-            with contextlib.suppress(queue.Empty):
-                line = self._lines.get(timeout=0.1)
-                if line.startswith(begins):
-                    return line.removeprefix(begins).strip()
-            if self.process.poll() is not None and self._lines.empty():
-                break
-        raise TimeoutError(f"{self.process.args[2]} did not say {begins!r}")  # type: ignore[index]
-
-    def ask(self, words: str, begins: str) -> str:
-        """Write a line and wait for its answer."""
-        self.tell(words)
-        return self.hear(begins)
-
-    def kill(self) -> None:
-        """End it at once, stopped or not."""
-        self.process.kill()
-        self.process.wait(10)
-
-
 class Rig:
     """What one fault is injected into; a context manager that leaves no process behind."""
 
-    def __init__(self, tables: dict[str, dict[str, Any]]) -> None:
+    def __init__(self, tables: dict[str, dict[str, Any]], device: str = "simulator") -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="pneuarm-faults-")
-        own = {name: TABLES.get(name, {}) | tables.get(name, {}) for name in TABLES | tables}
-        self.daemon = Daemon(Path(self._folder.name), own)
+        folder = Path(self._folder.name)
+        self.emulator = None if device == "simulator" else Emulator(device, folder)
+        device_tables = {} if self.emulator is None else self.emulator.tables
+        own: dict[str, dict[str, Any]] = {}
+        for part in (TABLES, device_tables, tables):
+            for name, table in part.items():
+                own[name] = own.get(name, {}) | table
+        self.daemon = Daemon(folder, own)
         self._programs: list[Program] = []
         self._watcher: Client | None = None
         self._mover: Program | None = None
@@ -96,12 +53,19 @@ class Rig:
         try:
             #: Between the time of the log and the monotonic clock, before anybody sets a clock.
             self.offset_ns = time.time_ns() - time.monotonic_ns()
-            self.daemon.start()
+            self._start()
             self._watcher = self.daemon.client("watcher")
         except BaseException:
             self.close()
             raise
         return self
+
+    def _start(self) -> None:
+        """Start the daemon; a machine with much else to do may take its time."""
+        self.daemon.launch()
+        wait_for(self.daemon._answers, lambda: f"an answer; it said: {self.daemon.output()}", 60.0)
+        highest_pa = load(self.daemon.config).build_arm().per_chamber("pressure_max_pa").max()
+        self._air_pa = max(2.5 * EMPTY_PA, 0.08 * highest_pa)
 
     def __exit__(
         self,
@@ -117,6 +81,8 @@ class Rig:
         self.end_programs()
         with contextlib.suppress(Exception):
             self.daemon.kill()
+        if self.emulator is not None:
+            self.emulator.kill()
         self._folder.cleanup()
 
     def end_programs(self) -> None:
@@ -237,7 +203,7 @@ class Rig:
             state = self.watcher.state()
             if state.mode != pb.ACTIVE:
                 self.mover.ask("go", "moves")
-            return max((abs(p) for p in state.pressure_sent_pa), default=0.0) > 4 * NEAR_ZERO_PA
+            return max((abs(p) for p in state.pressure_sent_pa), default=0.0) > self._air_pa
 
         self.wait_until(has_air, "air in a moving arm", 20.0)
 
@@ -250,10 +216,23 @@ class Rig:
         else:
             injection.check("the stop works afterwards", True)
         self.wait_for_mode(pb.ESTOP)
-        self.watcher.reset()
-        self.wait_for_mode(pb.READY)
+        time.sleep(0.05)  # a stop and a reset may overtake each other on the way
+        self.wait_until(self._is_reset, "READY after a reset", 15.0)
         self.move()
         injection.check("reset and enable arm again", self.mode == pb.ACTIVE)
+
+    def emulator_is_zeroed(self) -> bool:
+        """Whether the device's record ends in zeros."""
+        assert self.emulator is not None
+        return not read_record(self.emulator.record).setpoints_pa[-1].any()
+
+    def _is_reset(self) -> bool:
+        """Reset as often as it takes: a device that is away must come back first."""
+        mode = self.mode
+        if mode in (pb.ESTOP, pb.FAULT):
+            self.watcher.reset()
+            time.sleep(0.1)
+        return mode == pb.READY
 
     @property
     def alive(self) -> bool:
@@ -265,6 +244,8 @@ class Rig:
         """Wait until the daemon and all its processes are gone."""
         self.end_programs()
         status = self.daemon.wait()
+        if self.emulator is not None:
+            time.sleep(EMPTIES_S)
         injection.check("exit status", status in statuses, f"{status} instead of {statuses}")
         self.check_said(injection)
         leftover = [path for path in Path("/dev/shm").glob("*") if self.daemon.arm in path.name]
@@ -279,6 +260,14 @@ class Rig:
         """First part of the newest session; raises ValueError where there is none."""
         logs = self.daemon.logs.glob("*.mcap")
         return max(path for path in logs if "." not in path.stem)
+
+    def last_words(self) -> str:
+        """What the daemon has said last, for whoever looks for the cause."""
+        newest = self._watcher._newest if self._watcher is not None else None
+        lines = [] if newest is None else [f"mode {pb.Mode.Name(newest.mode)}"]
+        with contextlib.suppress(OSError):
+            lines += self.daemon.output().splitlines()[-6:]
+        return "".join(f"\n    {line}" for line in lines)
 
     def memory_bytes(self, name: str) -> int:
         """Resident memory of one of the daemon's processes."""

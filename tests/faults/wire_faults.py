@@ -18,7 +18,7 @@ def _garbage(rig: Rig, injection: Injection) -> None:
     before = rig.memory_bytes("gateway")
     injection.begin()
     fuzzer.tell(f"{injection.seed} {PAYLOADS}")
-    injection.figures["payloads"] = float(fuzzer.hear("sent"))
+    injection.figures["payloads_number"] = float(fuzzer.hear("sent"))
     injection.must_go_on()
     rig.move()
     injection.check("the gateway lives", rig.pid("gateway") == gateway)

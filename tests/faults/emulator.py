@@ -1,0 +1,107 @@
+"""An emulated device in a process of its own, and the record of what has reached it."""
+
+import contextlib
+import json
+import os
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from tests.faults.program import Program
+
+#: Gauge pressure below which a chamber counts as empty, Pa.
+EMPTY_PA = 1000.0
+
+
+#: Arms for devices that cannot move the default one: an ESP32's pump gives 0.13 bar.
+_ARMS: dict[str, dict[str, Any]] = {
+    "esp32": {
+        "arm": {
+            "sections": [
+                {
+                    "rest_length_mm": 200.0,
+                    "chamber_offset_mm": 38.0,
+                    "length_min_mm": 100.0,
+                    "length_max_mm": 300.0,
+                    "bend_max_deg": 150.0,
+                    "length_rate_max_mm_s": 200.0,
+                    "pressure_min_bar": 0.0,
+                    "pressure_max_bar": 0.12,
+                    "pressure_slew_max_bar_s": 0.6,
+                    "lengthening_mm_per_bar": 800.0,
+                }
+            ]
+        }
+    }
+}
+
+
+class Emulator:
+    """`pneuarm emulate WHAT`, with the tables that make a daemon use it."""
+
+    def __init__(self, what: str, folder: Path) -> None:
+        own = _ARMS.get(what, {})
+        arm = folder / f"{what}.toml"
+        arm.write_text(tomli_w.dumps(own))
+        self.record = Path(tempfile.mkstemp(".jsonl", "device-", folder)[1])
+        self._program = Program(
+            "pneuarm", "emulate", what, "--arm", str(arm), "--record", str(self.record)
+        )
+        self.tables = own | self._configuration()
+        with contextlib.suppress(OSError):  # it stands for another machine, which has nothing else
+            os.sched_setscheduler(self._program.process.pid, os.SCHED_FIFO, os.sched_param(70))
+
+    def _configuration(self) -> dict[str, dict[str, Any]]:
+        """Read the lines that it prints, up to the last, which names the faults."""
+        lines: list[str] = []
+        while not lines or not lines[-1].startswith("# faults"):
+            lines.append(self._program.hear(""))
+        tables: dict[str, Any] = tomllib.loads("\n".join(lines))
+        return {name: table for name, table in tables.items() if isinstance(table, dict)}
+
+    def inject(self, words: str) -> None:
+        """Break something; returns once it is broken."""
+        self._program.ask(words, f"fault      {words}")
+
+    def kill(self) -> None:
+        """End it."""
+        self._program.kill()
+
+
+@dataclass
+class Record:
+    """What reached the device; times monotonic, ns. Shapes (n,) and (n, chambers).
+
+    Setpoints stand until the next; ``true_pa`` are the real pressures, sampled.
+    """
+
+    time_ns: np.ndarray
+    setpoints_pa: np.ndarray
+    why: list[str]
+    sampled_ns: np.ndarray
+    true_pa: np.ndarray
+
+
+def read_record(path: Path) -> Record:
+    """Read a device's record; the line that is being written is left out."""
+    setpoints, samples = [], []
+    for line in path.read_text().splitlines():
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        (setpoints if "why" in entry else samples).append(entry)
+    return Record(
+        time_ns=np.array([round(entry["time_s"] * 1e9) for entry in setpoints], dtype=np.int64),
+        setpoints_pa=np.array([entry["setpoints_pa"] for entry in setpoints]).reshape(
+            len(setpoints), -1
+        ),
+        why=[entry["why"] for entry in setpoints],
+        sampled_ns=np.array([round(entry["time_s"] * 1e9) for entry in samples], dtype=np.int64),
+        true_pa=np.array([entry["true_pa"] for entry in samples]).reshape(len(samples), -1),
+    )
