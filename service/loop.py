@@ -250,12 +250,12 @@ class Loop:
         if self._keeper.mode == Mode.ACTIVE:
             self._wanted = self._steering.step(dt_s)
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
-            dither_pa = self._steering.dither_pa(now_s)
-            if not dither_pa:
-                return self._wanted
-            return np.minimum(np.maximum(self._wanted + dither_pa, self._low), self._high)
+            setpoints = self._steering.sent_pa(self._wanted, dt_s, now_s)
+            return np.minimum(np.maximum(setpoints, self._low), self._high)
         self._tick["tip_commanded_position_m"] = np.nan
-        return self._sent  # hold keeps the last; in the vented modes it is zero already
+        if self._keeper.mode == Mode.HOLD:
+            return self._wanted  # what the chambers have or are about to have, without any lead
+        return self._sent  # in the vented modes it is zero already
 
     def _send(self, wanted: Array, now_s: float) -> None:
         if self._keeper.mode in VENTED_MODES:
