@@ -8,6 +8,7 @@ themselves are in :mod:`service.tables`.
 
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -20,6 +21,8 @@ from controllers.arm import Arm
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
+from service.tables.feedback import FeedbackConfig, ReferenceConfig
+from service.tables.frames import FramesConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
 from service.tables.table import Table
@@ -33,6 +36,9 @@ class Configuration(Table):
     preset: Literal["paper", "table1", "trunk"] = "paper"
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
+    reference: ReferenceConfig = ReferenceConfig()
+    feedback: FeedbackConfig = FeedbackConfig()
+    frames: FramesConfig = FramesConfig()
     hardware: HardwareConfig = HardwareConfig()
     simulator: SimulatorConfig = SimulatorConfig()
     zenoh: ZenohConfig = ZenohConfig()
@@ -50,7 +56,7 @@ class Configuration(Table):
 
     def build_arm(self) -> Arm:
         """Return the arm that the controller believes in, in SI units."""
-        return self.arm.build()
+        return replace(self.arm.build(), tool_m=self.frames.tool_m())
 
     def build_simulated_arm(self) -> Arm:
         """Return the arm that the simulator makes real: ``arm`` where nothing else is said."""

@@ -15,6 +15,7 @@ from service.checks import TargetChecker
 from service.commands import Pipe, SetTarget, SetTipPose
 from service.lease import Lease
 from service.notes import Notes
+from service.pose_publisher import PosePublisher
 from service.process import Shared
 from service.publisher import Publisher
 
@@ -30,9 +31,12 @@ class Inbox:
     ) -> None:
         control = shared.configuration.control
         self._stream, self._lease, self._publisher, self._notes = stream, lease, publisher, notes
-        self._checker = TargetChecker(shared.configuration.build_arm())
-        arm = shared.configuration.build_arm()
-        self._workspace = Workspace(arm) if arm.n_sections == 1 else None
+        configuration = shared.configuration
+        arm, frames = configuration.build_arm(), configuration.frames.frames()
+        self._checker = TargetChecker(arm, frames, configuration.reference.limits())
+        self._publisher_of_poses = PosePublisher()
+        exact = arm.n_sections == 1 and not any(arm.tool_m)
+        self._workspace = Workspace(arm) if exact else None
         self._out_of_reach = False
         self._rate_hz = control.rate_hz
         self._stale_s = control.target_timeout_ms * 1e-3
@@ -108,6 +112,7 @@ class Inbox:
         payload = sample.payload.to_bytes()
         try:
             message = decode(PoseInFrame, payload, str(sample.encoding))
+            self._publisher_of_poses.check(sample, message, received_ns * 1e-9)
             position, quaternion = self._checker.tip_pose(message)
         except TargetRejected as error:
             self._notes.reject(TIP_POSE.key, str(error), payload, "")
