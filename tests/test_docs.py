@@ -14,7 +14,7 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from service import config
 from service.mode import TABLE, Mode, ModeEvent
-from service.tables import arm, control, hardware, outputs
+from service.tables import arm, control, feedback, frames, hardware, outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -27,6 +27,9 @@ TABLES: dict[str, type[BaseModel]] = {
     "`[arm.response]`": arm.ResponseConfig,
     "`[[arm.sections]]`": arm.SectionConfig,
     "`[control]`": control.ControlConfig,
+    "`[reference]`": feedback.ReferenceConfig,
+    "`[feedback]`": feedback.FeedbackConfig,
+    "`[frames]`": frames.FramesConfig,
     "`[hardware]`": hardware.HardwareConfig,
     "`[simulator]`": hardware.SimulatorConfig,
     "`[zenoh]`": outputs.ZenohConfig,

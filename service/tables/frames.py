@@ -15,7 +15,7 @@ Triple = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
 class FramesConfig(Table):
     """Poses of one frame in another: a position and a rotation vector, axis times angle."""
 
-    mocap_frame: Annotated[str, Field(min_length=1, max_length=64)] = "mocap"
+    mocap_frame: Annotated[str, Field(max_length=64)] = ""
     mocap_position_mm: Triple = (0.0, 0.0, 0.0)
     mocap_rotation_deg: Triple = (0.0, 0.0, 0.0)
     tip_in_marker_position_mm: Triple = (0.0, 0.0, 0.0)
