@@ -139,12 +139,15 @@ class Steering:
         """
         if self._target is None:
             self._dither_since_s = None
+            self._controller.set_hysteresis_share(1.0)
             return 0.0
         if self._dither_since_s is None:
             if not (self.observer.seen and self._feedback.enabled):
                 return 0.0
             self._dither_since_s = now_s
         share = min(1.0, (now_s - self._dither_since_s) / _DITHER_RAMP_S)
+        less = 1.0 - self._feedback.hysteresis_share
+        self._controller.set_hysteresis_share(1.0 - share * less)
         return share * self._dither.at_pa(now_s)
 
     def observe(self, vented: bool) -> None:
