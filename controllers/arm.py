@@ -3,7 +3,7 @@
 Arrays of chamber quantities have the shape ``(n_sections, 3)``; SI units throughout.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -69,6 +69,17 @@ class Section:
                 f"pressure_min_pa = {self.pressure_min_pa:g}, pressure_max_pa = "
                 f"{self.pressure_max_pa:g}: zero (ambient, the vented arm) must lie between them"
             )
+
+
+def uncalibrated(section: Section) -> Section:
+    """Return the section with each chamber on its own: no coupling, load or hysteresis."""
+    return replace(
+        section,
+        coupling=UNCOUPLED,
+        hysteresis_pa=0.0,
+        bending_compliance_rad_per_n_m=0.0,
+        axial_compliance_m_per_n=0.0,
+    )
 
 
 def _ordered(low_name: str, low: float, high_name: str, high: float) -> None:

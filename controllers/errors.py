@@ -5,6 +5,7 @@ PneuarmError
 |-- ConfigurationError      a key of the configuration
 |-- HardwareError           a device: connection, answer, diagnosis
 |-- LogError                a session log
+|-- CalibrationError        a motion, or a log, that does not show what a calibration needs
 |-- TargetRejected          a target that the daemon does not take
 |-- ModeRefused             a mode change that is not allowed now
 |   `-- LeaseRefused        another client holds the arm
@@ -31,6 +32,10 @@ class HardwareError(PneuarmError):
 
 class LogError(PneuarmError):
     """A session log cannot be read or written."""
+
+
+class CalibrationError(PneuarmError):
+    """What was moved or recorded does not determine the map; the text says what is missing."""
 
 
 class TargetRejected(PneuarmError):

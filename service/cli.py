@@ -87,6 +87,12 @@ def _workspace(arguments: argparse.Namespace) -> int:
     return workspace(arguments)
 
 
+def _calibrate(arguments: argparse.Namespace) -> int:
+    from service.commands_calibrate import run
+
+    return run(arguments)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
@@ -99,6 +105,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_logs(commands)
     _add_validate(commands)
     _add_workspace(commands)
+    _add_calibrate(commands)
     return parser
 
 
@@ -241,6 +248,20 @@ def _add_workspace(commands: Subparsers) -> None:
     workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
     workspace.add_argument("--seed", type=int, default=0, help="seed of the random points")
     workspace.add_argument("--json", action="store_true", help="one JSON object instead of text")
+
+
+def _add_calibrate(commands: Subparsers) -> None:
+    help_text = "Move the arm, fit the map between pressure and length, write a configuration."
+    calibrate = _command(commands, "calibrate", _calibrate, help_text)
+    _add_connection(calibrate)
+    calibrate.set_defaults(arm=None)  # a log says by itself whose it is
+    calibrate.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="(default: .)")
+    calibrate.add_argument(
+        "--from", dest="from_logs", nargs="+", type=Path, metavar="LOG", help="recorded sessions"
+    )
+    calibrate.add_argument(
+        "--world", action="store_true", help="poses are of a marker, in a frame not the base's"
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -17,7 +17,7 @@ import tomli_w
 from platformdirs import user_state_path
 from pydantic import BaseModel, ValidationError, model_validator
 
-from controllers.arm import Arm
+from controllers.arm import Arm, uncalibrated
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
@@ -59,8 +59,13 @@ class Configuration(Table):
         return replace(self.arm.build(), tool_m=self.frames.tool_m())
 
     def build_simulated_arm(self) -> Arm:
-        """Return the arm that the simulator makes real: ``arm`` where nothing else is said."""
-        return (self.simulator.arm or self.arm).build()
+        """Return the arm that the simulator makes real: ``arm`` where nothing else is said.
+
+        Its body has weight, stiffness and hysteresis of its own: those of a calibration are left
+        out.
+        """
+        arm = (self.simulator.arm or self.arm).build()
+        return replace(arm, sections=tuple(uncalibrated(section) for section in arm.sections))
 
     @property
     def device_address(self) -> str:

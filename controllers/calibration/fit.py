@@ -64,7 +64,9 @@ class _Problem:
         self._span_pa = np.array([[span_pa(section)] for section in arm.sections])
         self.start = start_of(arm)
         self._shape = self.start.shape
-        pose = self.model.tips(recording.sent_pa[rests.last], self.start).pose
+        width = self.start[:, 13:] * self._span_pa
+        acting, _ = play_outputs(recording.sent_pa, width)
+        pose = self.model.poses(acting[rests.last], self.start)
         self.frames = aligned(pose[:, :3], rests.tip_m) if in_world else in_base()
         self.before_m = self.frames.measured_m(pose)
         self._free = self._free_parameters(in_world)
@@ -83,8 +85,7 @@ class _Problem:
         if np.linalg.norm(self.arm.gravity_m_s2) == 0.0:
             free[:, 4:6] = False
         if in_world:
-            free[0, 12] = False  # the turn about the backbone is the base's
-            free[:, 12] = False
+            free[:, 12] = False  # the turn about the backbone is the base's
         return free.reshape(-1)
 
     def theta(self, x: Array) -> Array:
@@ -104,7 +105,7 @@ class _Problem:
 
     def rows(self, x: Array) -> Array:
         pressures, _ = self.effective(x)
-        pose = self.model.tips(pressures, self.theta(x)).pose
+        pose = self.model.poses(pressures, self.theta(x))
         errors = (self.frames_at(x).measured_m(pose) - self.rests.tip_m) / MODEL_SD_M
         return np.append(errors.reshape(-1), (x - self._centre) / self.sd)
 
@@ -155,7 +156,7 @@ def fit(arm: Arm, recording: Recording, rests: Rests, in_world: bool = False) ->
     posterior = np.linalg.inv(data.T @ data + np.diag(problem.sd**-2.0))
     sd = np.sqrt(np.diag(posterior))
     theta, effective = problem.theta(x), problem.effective(x)[0]
-    after_m = problem.frames_at(x).measured_m(problem.model.tips(effective, theta).pose)
+    after_m = problem.frames_at(x).measured_m(problem.model.poses(effective, theta))
     return Fit(
         arm=arm_of(arm, theta),
         frames=problem.frames_at(x),

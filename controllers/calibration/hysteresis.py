@@ -4,6 +4,8 @@ A play of half width w holds its output until the input has pushed it: the outpu
 clipped to ``input - w .. input + w``.
 """
 
+from itertools import accumulate
+
 import numpy as np
 
 from controllers.arm import Array
@@ -15,11 +17,22 @@ def play_outputs(pressures_pa: Array, half_width_pa: Array) -> tuple[Array, Arra
     ``pressures_pa`` (samples, n_sections, 3) is the whole history from an arm that was vented,
     ``half_width_pa`` (n_sections, 1) or alike. Both results have the shape of the pressures.
     """
-    outputs, slopes = np.zeros_like(pressures_pa), np.zeros_like(pressures_pa)
-    last, slope = np.zeros(pressures_pa.shape[1:]), np.zeros(pressures_pa.shape[1:])
-    for index, pressures in enumerate(pressures_pa):
-        low, high = pressures - half_width_pa, pressures + half_width_pa
-        slope = np.where(last < low, -1.0, np.where(last > high, 1.0, slope))
-        last = np.minimum(np.maximum(last, low), high)
-        outputs[index], slopes[index] = last, slope
-    return outputs, slopes
+    low = (pressures_pa - half_width_pa).reshape(len(pressures_pa), -1)
+    high = (pressures_pa + half_width_pa).reshape(len(pressures_pa), -1)
+    outputs = np.stack([_clipped(*pair) for pair in zip(low.T, high.T, strict=True)], axis=1)
+    # The play moves with the bound that pushed it last.
+    pushed = np.where(outputs == low, -1.0, np.where(outputs == high, 1.0, 0.0))
+    rows = np.where(pushed != 0.0, np.arange(len(low))[:, None], 0)
+    slopes = np.take_along_axis(pushed, np.maximum.accumulate(rows, axis=0), axis=0)
+    return outputs.reshape(pressures_pa.shape), slopes.reshape(pressures_pa.shape)
+
+
+def _clipped(low: Array, high: Array) -> Array:
+    """Clip a running value, 0 before the first sample, to every pair of bounds (samples,)."""
+
+    def clip(last: float, bounds: tuple[float, float]) -> float:
+        lowest, highest = bounds
+        return lowest if last < lowest else highest if last > highest else last
+
+    pairs = zip(low.tolist(), high.tolist(), strict=True)
+    return np.fromiter(accumulate(pairs, clip, initial=0.0), float)[1:]

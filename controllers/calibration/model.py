@@ -51,6 +51,7 @@ class TipModel:
         total += ca.jacobian(pose, ca.vertcat(flat, pressures))
         self._goal = ca.Function("goal", [pressures, flat], [goal])
         self._step = ca.Function("step", inputs, ca.cse([step]))
+        self._pose = ca.Function("pose", [lengths, flat], ca.cse([pose]))
         self._tip = ca.Function("tip", inputs, ca.cse([pose, ca.densify(total)]))
         self._n_theta = flat.numel()
 
@@ -63,6 +64,12 @@ class TipModel:
         pose, total = (np.asarray(each) for each in self._tip(lengths, columns, flat))
         total = total.reshape(12, batch, -1).transpose(1, 0, 2)
         return Tips(pose.T, total[:, :, : self._n_theta], total[:, :, self._n_theta :])
+
+    def poses(self, pressures_pa: Array, theta: Array) -> Array:
+        """Poses (batch, 12) as in :class:`Tips`, without their derivatives."""
+        columns = pressures_pa.reshape(len(pressures_pa), -1).T
+        flat = theta[:, :SHAPING].reshape(-1)
+        return np.asarray(self._pose(self._lengths(columns, flat), flat)).T
 
     def _lengths(self, columns: Array, flat: Array) -> Array:
         """Loaded lengths (n_chambers, batch); unloaded ones where Newton does not converge."""

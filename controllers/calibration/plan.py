@@ -16,7 +16,7 @@ from controllers.kinematics.constant_curvature import shapes_from_lengths
 LARGEST_SHARE = 0.7
 RAMP_S = 0.7
 REST_S = 0.95
-STEP_REST_S = 2.2
+STEP_REST_S = 2.3
 
 #: Of the largest bend of a section: what one chamber alone, or two, may bend it.
 _BEND_SHARE = 0.75
@@ -50,6 +50,7 @@ _ALONE = (0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0)
 _PAIR = (1.0, 0.4, -0.7)
 _ALL = (0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5)
 _MIXED = 12
+_STEP_SHARE = 0.7
 _STEPS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -66,10 +67,10 @@ def plan(arm: Arm, seed: int = 0) -> list[Move]:
     shares += list(rng.uniform(-0.9, 0.9, (mixed, arm.n_sections, 3)))
     shares.append(np.zeros((arm.n_sections, 3)))
     moves = [Move(_pressures(arm, share), RAMP_S, REST_S) for share in _possible(arm, shares)]
+    size = _STEP_SHARE / arm.n_sections  # the tip swings as far, whatever hangs from what
     for step in _STEPS:
-        share = np.zeros((arm.n_sections, 3))
-        share[:] = step
-        moves.append(Move(_pressures(arm, 0.7 * share), 0.0, STEP_REST_S))
+        share = np.tile(size * np.array(step), (arm.n_sections, 1))
+        moves.append(Move(_pressures(arm, share), 0.0, STEP_REST_S))
     return moves
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.arm import Array
-from controllers.errors import InvalidInput
+from controllers.errors import CalibrationError
 
 #: Pressures that change no faster than this (Pa/s) count as still.
-_STILL_PA_S = 3000.0
+STILL_PA_S = 3000.0
 #: The tip is averaged over this time (s) at the end of a rest: about one swing of a soft arm.
 AVERAGED_S = 0.4
 #: So long (s) must pressures have been still before that, for the arm to have come to rest.
@@ -51,9 +51,9 @@ class Rests:
 
 
 def find_rests(recording: Recording) -> Rests:
-    """Find every place where pressures were still long enough; raises InvalidInput for none."""
+    """Find every place where pressures were still long enough; raises CalibrationError for none."""
     moved = np.abs(np.diff(recording.sent_pa.reshape(len(recording.time_s), -1), axis=0))
-    moving = moved.max(axis=1) > _STILL_PA_S * np.diff(recording.time_s)
+    moving = moved.max(axis=1) > STILL_PA_S * np.diff(recording.time_s)
     last, tips = [], []
     start = 0
     for end in [*(np.flatnonzero(moving) + 1), len(recording.time_s)]:
@@ -63,7 +63,7 @@ def find_rests(recording: Recording) -> Rests:
             tips.append(tip)
         start = end
     if not last:
-        raise InvalidInput(
+        raise CalibrationError(
             "the arm was never still with its tip measured: pressures must be held for "
             f"{SETTLING_S + AVERAGED_S:g} s at every place, with a tip pose not older than "
             f"{_OLDEST_S:g} s"

@@ -1,0 +1,1 @@
+"""`pneuarm calibrate`: the motion, the recording, what is written of it."""

@@ -1,0 +1,87 @@
+"""calibration.toml: the daemon's effective configuration with the fitted values in place."""
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers.arm import Response, Section
+from controllers.calibration.calibrate import Calibration
+from controllers.errors import ConfigurationError
+from service.calibration.values import residuals_text, value_text, values
+from service.config import Configuration, check
+from service.tables.table import BAR, DEG, MM
+
+_DIGITS = 7
+
+
+def calibrated(configuration: Configuration, calibration: Calibration) -> Configuration:
+    """Return the configuration with the fitted values.
+
+    A simulated arm stays what it was: the simulator goes on with the arm from before.
+    """
+    tables = configuration.model_dump(exclude_none=True)
+    if configuration.hardware.adapter == "simulator" and configuration.simulator.arm is None:
+        tables["simulator"]["arm"] = configuration.arm.model_dump()
+    sections = zip(tables["arm"]["sections"], calibration.arm.sections, strict=True)
+    tables["arm"]["sections"] = [old | _section(section) for old, section in sections]
+    tables["arm"]["response"] = _response(calibration.arm.response)
+    return check(tables, "calibration.toml")
+
+
+def _section(section: Section) -> dict[str, Any]:
+    coupling = np.round(np.array(section.coupling), _DIGITS)
+    return {
+        "rest_length_mm": _rounded(section.rest_length_m / MM),
+        "chamber_offset_mm": _rounded(section.chamber_offset_m / MM),
+        "lengthening_mm_per_bar": _rounded(section.lengthening_m_per_pa * BAR / MM),
+        "softening_mm_per_bar2": _rounded(section.softening_m_per_pa2 * BAR**2 / MM),
+        "coupling": coupling.tolist(),
+        "hysteresis_bar": _rounded(section.hysteresis_pa / BAR),
+        "bending_compliance_deg_per_n_m": _rounded(section.bending_compliance_rad_per_n_m / DEG),
+        "axial_compliance_mm_per_n": _rounded(section.axial_compliance_m_per_n / MM),
+    }
+
+
+def _response(response: Response) -> dict[str, float]:
+    return {
+        "delay_ms": _rounded(response.delay_s * 1e3),
+        "lag_ms": _rounded(response.lag_s * 1e3),
+        "mode_hz": _rounded(response.mode_hz),
+        "damping_ratio": _rounded(response.damping_ratio),
+    }
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def toml_text(configuration: Configuration, calibration: Calibration) -> str:
+    """Text of the file: date, arm and residuals in comments, then the whole configuration."""
+    when = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+    lines = [
+        f"Calibration of arm {configuration.arm.name}, {when}: {residuals_text(calibration)}.",
+        "Run it with `pneuarm run calibration.toml`. Fitted, with standard deviations:",
+        *(f"  {value_text(value)}" for value in values(calibration)),
+    ]
+    comments = "".join(f"# {line}\n" for line in lines)
+    return f"{comments}\n{calibrated(configuration, calibration).to_toml()}"
+
+
+def require_folder(folder: Path) -> None:
+    """Make the folder, before the arm moves for nothing; raises ConfigurationError."""
+    write_whole(folder / ".calibration", "")
+    (folder / ".calibration").unlink()
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file that is there whole or not at all; raises ConfigurationError."""
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_text(text)
+        os.replace(beside, path)
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
