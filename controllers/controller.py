@@ -78,6 +78,10 @@ class Controller:
         self._offset_m, self._turn = offset_m, rotation
         self._motion.correct(offset_m, rotation)
 
+    def set_hysteresis_share(self, share: float) -> None:
+        """Invert so much of the calibrated hysteresis, 0 to 1, from now on."""
+        self._inverse_play.share = share
+
     @property
     def model_tip(self) -> TipState:
         """Tip of the commanded lengths by the model alone; reused by the next step."""

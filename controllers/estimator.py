@@ -33,8 +33,8 @@ class TipEstimate:
 class Estimator:
     """Lengths from a length sensor where there is one, else from the pressure through the map.
 
-    The tip follows by constant curvature, load and coupling included where they are calibrated
-    (hysteresis is not), corrected by what motion capture has taught; while it is seen, the tip is
+    The tip follows by constant curvature, load and coupling in it where they are calibrated,
+    hysteresis not; corrected by what motion capture has taught. While that sees the tip, it is
     where the response to the commands and the newest pose say.
     """
 

@@ -82,7 +82,7 @@ class Frames:
     of the tip to its marker; ``tool_m`` is the tool point in the tip frame.
     """
 
-    mocap_frame: str = "mocap"
+    mocap_frame: str = ""
     mocap_to_base: Transform = field(default_factory=Transform)
     tip_to_marker: Transform = field(default_factory=Transform)
     tool_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -94,12 +94,11 @@ class Frames:
         """
         if frame_id == "base":
             in_base = marker
-        elif frame_id == self.mocap_frame:
+        elif frame_id and frame_id == self.mocap_frame:
             in_base = self.mocap_to_base @ marker
         else:
-            raise InvalidInput(
-                f"frame_id = {frame_id!r}: unknown frame; allowed: 'base', {self.mocap_frame!r}"
-            )
+            known = f"'base', {self.mocap_frame!r}" if self.mocap_frame else "'base'"
+            raise InvalidInput(f"frame_id = {frame_id!r}: unknown frame; allowed: {known}")
         tip = in_base @ self.tip_to_marker
         return tip @ Transform(position_m=np.array(self.tool_m))
 

@@ -6,7 +6,8 @@ from google.protobuf.message import Message
 
 from controllers.actuation import length_bounds_m
 from controllers.arm import Arm, Array
-from controllers.errors import TargetRejected
+from controllers.errors import InvalidInput, TargetRejected
+from controllers.frames import Frames, Transform
 from controllers.targets import (
     DirectionTarget,
     LawName,
@@ -21,7 +22,10 @@ from controllers.targets import (
     TwistTarget,
     WeightedTarget,
 )
+from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
+from controllers.trajectory import ReferenceLimits
 from logs.schema import pneuarm_pb2 as pb
+from service.shape_checks import ShapeChecker
 
 #: A position farther than this many arm lengths is not a position in metres.
 FARTHEST_ARM_LENGTHS = 3.0
@@ -42,8 +46,15 @@ _CONTRADICTORY = (("position", "pose"), ("direction", "pose"))
 class TargetChecker:
     """Turns target messages for one arm into checked targets; raises TargetRejected."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        frames: Frames | None = None,
+        reference: ReferenceLimits | None = None,
+    ) -> None:
         self._arm = arm
+        self._frames = frames or Frames()
+        self._shapes = ShapeChecker(arm, reference or ReferenceLimits(), self._position)
         self._farthest_m = FARTHEST_ARM_LENGTHS * arm.max_length_m
         self._length_low, self._length_high = length_bounds_m(arm)
         self._pressure_low = arm.per_chamber("pressure_min_pa")
@@ -56,7 +67,7 @@ class TargetChecker:
             case "position":
                 _require(message.position, "position_m")
                 position = self._position(message.position.frame_id, message.position.position_m)
-                return PositionTarget(position, law)
+                return PositionTarget(position, law, _velocity(message.position))
             case "pose":
                 _require(message.pose, "position_m", "orientation")
                 position = self._position(message.pose.frame_id, message.pose.position_m)
@@ -73,9 +84,11 @@ class TargetChecker:
                 return self._point(message.point, law)
             case "tasks":
                 return self._tasks(message.tasks, law)
+            case "trajectory" | "circle" | "line":
+                return self._shapes.target(message, law)
         raise TargetRejected(
             "the message holds no target; one of position, pose, twist, lengths, pressures, "
-            "direction, point, tasks"
+            "direction, point, tasks, trajectory, circle, line"
         )
 
     def _point(self, message: pb.PointTarget, law: LawName = LawName.DEFAULT) -> PointTarget:
@@ -141,22 +154,34 @@ class TargetChecker:
         )
 
     def tip_pose(self, message: PoseInFrame) -> tuple[Array, Array]:
-        """Check a measured tip pose; return position (3,) and quaternion (4,)."""
+        """Check a measured marker pose; return the tip's position (3,) and quaternion (4,).
+
+        Both are in the base frame; the position is the tool point's.
+        """
         _require(message, "pose")
         _require(message.pose, "position", "orientation")
-        position = self._position(message.frame_id, message.pose.position)
-        return position, _quaternion(message.pose.orientation)
+        rotation = rotation_from_quaternion(_quaternion(message.pose.orientation))
+        marker = Transform(rotation, _vector("position", message.pose.position))
+        try:
+            tool = self._frames.tool_pose(marker, message.frame_id)
+        except InvalidInput as error:
+            raise TargetRejected(str(error)) from error
+        self._check_near(tool.position_m)
+        return tool.position_m, quaternion_from_rotation(tool.rotation)
 
     def _position(self, frame_id: str, vector: object) -> Array:
         _check_frame(frame_id, ("base",))
         position = _vector("position_m", vector)
+        self._check_near(position)
+        return position
+
+    def _check_near(self, position: Array) -> None:
         distance = float(np.linalg.norm(position))
         if distance > self._farthest_m:
             raise TargetRejected(
                 f"position_m = {_list(position)} is {distance:.3g} m from the base, more than "
                 f"{FARTHEST_ARM_LENGTHS:g} arm lengths; is it in mm?"
             )
-        return position
 
     def _lengths(self, message: pb.LengthsTarget) -> Array:
         return self._chambers(
@@ -196,6 +221,17 @@ def _law(number: int) -> LawName:
         raise TargetRejected(
             f"law = {number}; allowed: 0 (the configured one), 1 (resolved rate), 2 (QP)"
         ) from None
+
+
+def _velocity(message: pb.PositionTarget) -> Array | None:
+    if not message.HasField("velocity_m_s"):
+        return None
+    velocity = _vector("velocity_m_s", message.velocity_m_s)
+    if np.linalg.norm(velocity) > FASTEST_M_S:
+        raise TargetRejected(
+            f"velocity_m_s = {_list(velocity)} is above {FASTEST_M_S:g} m/s; is it in mm/s?"
+        )
+    return velocity
 
 
 def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:

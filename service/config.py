@@ -22,7 +22,9 @@ from controllers.consistency import refuse_contradictions
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
+from service.tables.feedback import FeedbackConfig, ReferenceConfig
 from service.tables.festo import FestoCpxConfig, FestoVtemConfig
+from service.tables.frames import FramesConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.monitors import MonitorsConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
@@ -38,6 +40,9 @@ class Configuration(Table):
     preset: Literal["paper", "table1", "trunk"] = "paper"
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
+    reference: ReferenceConfig = ReferenceConfig()
+    feedback: FeedbackConfig = FeedbackConfig()
+    frames: FramesConfig = FramesConfig()
     hardware: HardwareConfig = HardwareConfig()
     monitors: MonitorsConfig = MonitorsConfig()
     simulator: SimulatorConfig = SimulatorConfig()
@@ -61,7 +66,7 @@ class Configuration(Table):
 
     def build_arm(self) -> Arm:
         """Return the arm that the controller believes in, in SI units."""
-        return self.arm.build()
+        return replace(self.arm.build(), tool_m=self.frames.tool_m())
 
     def build_simulated_arm(self) -> Arm:
         """Return the arm that the simulator makes real: ``arm`` where nothing else is said.

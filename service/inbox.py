@@ -19,6 +19,7 @@ from service.checks import TargetChecker
 from service.commands import Pipe, SetTarget, SetTipPose
 from service.lease import Lease
 from service.notes import Notes
+from service.pose_publisher import PosePublisher
 from service.process import Shared
 from service.publisher import Publisher
 
@@ -37,10 +38,12 @@ class Inbox:
     ) -> None:
         control = shared.configuration.control
         self._stream, self._lease, self._publisher, self._notes = stream, lease, publisher, notes
-        self._checker = TargetChecker(shared.configuration.build_arm())
-        arm = shared.configuration.build_arm()
-        # With keep-outs the workspace has holes that it does not know.
-        known = arm.n_sections == 1 and not arm.keep_outs
+        configuration = shared.configuration
+        arm, frames = configuration.build_arm(), configuration.frames.frames()
+        self._checker = TargetChecker(arm, frames, configuration.reference.limits())
+        self._publisher_of_poses = PosePublisher()
+        # With keep-outs the workspace has holes that it does not know; of a tool it knows nothing.
+        known = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
         self._workspace = Workspace(arm) if known else None
         self._out_of_reach = False
         self._nearest: tuple[Array, Array] | None = None
@@ -131,6 +134,7 @@ class Inbox:
         payload = sample.payload.to_bytes()
         try:
             message = decode(PoseInFrame, payload, str(sample.encoding))
+            self._publisher_of_poses.check(sample, message, received_ns * 1e-9)
             position, quaternion = self._checker.tip_pose(message)
         except TargetRejected as error:
             self._notes.reject(TIP_POSE.key, str(error), payload, "")

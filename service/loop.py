@@ -274,15 +274,15 @@ class Loop:
             self._wanted = self._steering.step(dt_s)
             self._tell_fallbacks()
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
-            dither_pa = self._steering.dither_pa(now_s)
-            if not dither_pa:
-                return self._wanted
-            return np.minimum(np.maximum(self._wanted + dither_pa, self._low), self._high)
+            setpoints = self._steering.sent_pa(self._wanted, dt_s, now_s)
+            return np.minimum(np.maximum(setpoints, self._low), self._high)
         self._tick["tip_commanded_position_m"] = np.nan
         ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
         if ramping is not None:
             return ramping
-        return self._sent  # hold keeps the last; in the vented modes it is zero already
+        if self._keeper.mode == Mode.HOLD:
+            return self._wanted  # what the chambers have or are about to have, without any lead
+        return self._sent  # in the vented modes it is zero already
 
     def _tell_fallbacks(self) -> None:
         """Tell that the QP gave nothing and the damped law went on, once in a while."""

@@ -14,7 +14,17 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from service import config
 from service.mode import TABLE, Mode, ModeEvent
-from service.tables import arm, control, festo, hardware, monitors, outputs, serial
+from service.tables import (
+    arm,
+    control,
+    feedback,
+    festo,
+    frames,
+    hardware,
+    monitors,
+    outputs,
+    serial,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -28,6 +38,9 @@ TABLES: dict[str, type[BaseModel]] = {
     "`[[arm.sections]]`": arm.SectionConfig,
     "`[[arm.keep_outs]]`": arm.KeepOutConfig,
     "`[control]`": control.ControlConfig,
+    "`[reference]`": feedback.ReferenceConfig,
+    "`[feedback]`": feedback.FeedbackConfig,
+    "`[frames]`": frames.FramesConfig,
     "`[hardware]`": hardware.HardwareConfig,
     "`[monitors]`": monitors.MonitorsConfig,
     "`[simulator]`": hardware.SimulatorConfig,
