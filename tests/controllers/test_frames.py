@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 
 from controllers.errors import InvalidInput
-from controllers.frames import Frames, Transform, rotation_from_vector, transform_of
+from controllers.frames import (
+    Frames,
+    Transform,
+    rotation_from_vector,
+    rotation_vector,
+    transform_of,
+)
 from controllers.kinematics.compiled import CompiledKinematics
-from controllers.tasks.tip_pose import rotation_vector
 from tests.arms import paper_arm
 
 RNG = np.random.default_rng(3)
