@@ -46,7 +46,7 @@ class Inbox:
         known = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
         self._workspace = Workspace(arm) if known else None
         self._out_of_reach = False
-        self._nearest: tuple[Array, Array] | None = None
+        self._nearest: tuple[Array, Reachability] | None = None
         self._searched_ns = 0
         self._rate_hz = control.rate_hz
         self._stale_s = control.target_timeout_ms * 1e-3
@@ -88,13 +88,14 @@ class Inbox:
         if self._nearest is None or not np.array_equal(self._nearest[0], target.position_m):
             if self._out_of_reach and now_ns - self._searched_ns < _SEARCH_EVERY_NS:
                 return target
-            answer = self._workspace.is_reachable(target.position_m)
-            self._nearest = target.position_m, self._workspace.lengths_m(answer.nearest_m)
+            self._nearest = target.position_m, self._workspace.is_reachable(target.position_m)
             self._searched_ns = now_ns
-            if not self._out_of_reach:
-                self._tell_out_of_reach(answer, client)
+        answer = self._nearest[1]
+        if not self._out_of_reach:
+            self._tell_out_of_reach(answer, client)
         self._out_of_reach = True
-        return replace(target, nearest_lengths_m=self._nearest[1])
+        lengths = self._workspace.lengths_m(answer.nearest_m)
+        return replace(target, nearest_lengths_m=lengths)
 
     def _tell_out_of_reach(self, answer: Reachability, client: str) -> None:
         names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
