@@ -73,10 +73,9 @@ def _chosen(names: list[str] | None) -> list[Fault]:
     """Return the faults that are meant: a whole name means that one, a part all that have it."""
     if not names:
         return list(FAULTS)
-    whole = {fault.name for fault in FAULTS}
-    return [
-        f for f in FAULTS if any(n == f.name or (n in f.name and n not in whole) for n in names)
-    ]
+    whole = [fault.name for fault in FAULTS]
+    parts = [name for name in names if name not in whole]
+    return [f for f in FAULTS if f.name in names or any(part in f.name for part in parts)]
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """A daemon, a program that moves its arm, and somebody who watches and stops it."""
 
 import contextlib
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -128,6 +127,10 @@ class Rig:
             self._mover.kill()
             self._programs.remove(self._mover)
             self._mover = None
+
+    def has_beside(self, name: str) -> bool:
+        """Whether such a program runs already."""
+        return name in self._beside
 
     def beside(self, name: str, module: str = "tests.faults.mover") -> Program:
         """Return a program that stays with this rig: a second client, or the fuzzer."""
@@ -270,6 +273,7 @@ class Rig:
         return "".join(f"\n    {line}" for line in lines)
 
     def memory_bytes(self, name: str) -> int:
-        """Resident memory of one of the daemon's processes."""
-        pages = int(Path(f"/proc/{self.pid(name)}/statm").read_text().split()[1])
-        return pages * os.sysconf("SC_PAGE_SIZE")
+        """Own memory of one of the daemon's processes; the rings, which all share, do not count."""
+        status = Path(f"/proc/{self.pid(name)}/status").read_text()
+        (line,) = (line for line in status.splitlines() if line.startswith("RssAnon"))
+        return 1024 * int(line.split()[1])
