@@ -23,10 +23,10 @@ _FAST_S, _SCATTER_S = 0.02, 0.5
 
 #: A tip whose mean of 30 ms is nearer (m) than this to that of 200 ms stands still. A chamber that
 #: sticks must be pushed through its dead band; an arm that swings must not be pushed at its swing.
-_QUICK_S, _SLOW_S, _STILL_M = 0.03, 0.2, 4e-4
+_QUICK_S, _SLOW_S, _STILL_M = 0.03, 0.2, 2e-4
 
 #: The correction of a tip that stands still goes so many times faster.
-_WHEN_STILL = 1.5
+_WHEN_STILL = 2.0
 
 #: An estimate is never told to be better than this (m): no camera sees an arm more exactly.
 _LEAST_SIGMA_M = 5e-5
@@ -44,7 +44,7 @@ class FeedbackSettings:
     enabled: bool = True
     delay_s: float = 0.01
     timeout_s: float = 0.1
-    time_constant_s: float = 0.15
+    time_constant_s: float = 0.2
     rate_max_m_s: float = 0.1
     deadband_m: float = 1e-4
     jump_max_m: float = 0.02

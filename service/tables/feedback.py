@@ -31,7 +31,7 @@ class FeedbackConfig(Table):
     enabled: bool = True
     camera_delay_ms: Annotated[float, Field(ge=0, le=300)] = 10.0
     camera_timeout_ms: Annotated[float, Field(ge=20, le=5000)] = 100.0
-    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 150.0
+    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 200.0
     rate_max_mm_s: Positive = 100.0
     deadband_mm: Annotated[float, Field(ge=0, le=5)] = 0.1
     jump_max_mm: Positive = 20.0
