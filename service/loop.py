@@ -275,7 +275,9 @@ class Loop:
             self._tell_fallbacks()
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
             setpoints = self._steering.sent_pa(self._wanted, dt_s, now_s)
-            return np.minimum(np.maximum(setpoints, self._low), self._high)
+            # Lead and dither stay inside the range; what is wanted beyond it, the guard counts.
+            low, high = np.minimum(self._low, self._wanted), np.maximum(self._high, self._wanted)
+            return np.minimum(np.maximum(setpoints, low), high)
         self._tick["tip_commanded_position_m"] = np.nan
         ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
         if ramping is not None:
