@@ -3,7 +3,7 @@
 Arrays of chamber quantities have the shape ``(n_sections, 3)``; SI units throughout.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -48,6 +48,7 @@ class Section:
     length_max_m: float
     bend_max_rad: float
     length_rate_max_m_s: float
+    length_acceleration_max_m_s2: float
     pressure_min_pa: float
     pressure_max_pa: float
     pressure_slew_max_pa_s: float
@@ -69,6 +70,17 @@ class Section:
                 f"pressure_min_pa = {self.pressure_min_pa:g}, pressure_max_pa = "
                 f"{self.pressure_max_pa:g}: zero (ambient, the vented arm) must lie between them"
             )
+
+
+def uncalibrated(section: Section) -> Section:
+    """Return the section with each chamber on its own: no coupling, load or hysteresis."""
+    return replace(
+        section,
+        coupling=UNCOUPLED,
+        hysteresis_pa=0.0,
+        bending_compliance_rad_per_n_m=0.0,
+        axial_compliance_m_per_n=0.0,
+    )
 
 
 def _ordered(low_name: str, low: float, high_name: str, high: float) -> None:
@@ -110,13 +122,36 @@ class Response:
 
 
 @dataclass(frozen=True)
+class Sphere:
+    """A place where no part of the arm may be: a ball around ``center_m`` (3,), base frame."""
+
+    center_m: tuple[float, float, float]
+    radius_m: float
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """A place where no part of the arm may be: all points with ``normal . p > offset_m``.
+
+    ``normal`` (3,) is a unit vector in the base frame and points into the forbidden side.
+    """
+
+    normal: tuple[float, float, float]
+    offset_m: float
+
+
+KeepOut = Sphere | HalfSpace
+
+
+@dataclass(frozen=True)
 class Arm:
     """A named list of sections, base first, how gravity acts on it and how it answers.
 
     ``gravity_m_s2`` is the acceleration of gravity in the base frame (z from base to tip of the
     straight arm): ``(0, 0, 9.81)`` is an arm that hangs. ``mass_kg`` is the mass of all sections,
     spread evenly over their rest lengths; it acts only where a section has a compliance.
-    ``tool_m`` is the point in the tip frame that counts as the tip everywhere.
+    ``tool_m`` is the point in the tip frame that counts as the tip everywhere. The backbone stays
+    ``body_radius_m`` away from every one of the ``keep_outs``.
     """
 
     name: str
@@ -125,6 +160,8 @@ class Arm:
     mass_kg: float = 1.0
     response: Response = Response()
     tool_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    keep_outs: tuple[KeepOut, ...] = ()
+    body_radius_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Raise InvalidInput for an arm without sections."""

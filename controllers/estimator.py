@@ -33,17 +33,20 @@ class TipEstimate:
 class Estimator:
     """Lengths from a length sensor where there is one, else from the pressure through the map.
 
-    The tip follows by constant curvature, corrected by what motion capture has taught; while it is
-    seen, the tip is where the response to the commands and the newest pose say.
+    The tip follows by constant curvature, load and coupling in it where they are calibrated,
+    hysteresis not; corrected by what motion capture has taught. While that sees the tip, it is
+    where the response to the commands and the newest pose say.
     """
 
     def __init__(self, arm: Arm) -> None:
         self._pressure_map = PressureMap(arm)
+        self._near_m: Array | None = None
         self._kinematics = CompiledKinematics(arm)
 
     def lengths_m(self, pressures_pa: Array, measured_lengths_m: Array) -> Array:
         """Best lengths (n_sections, 3); ``measured_lengths_m`` is NaN where nothing measures."""
-        from_pressure = self._pressure_map.lengths_m(pressures_pa)
+        from_pressure = self._pressure_map.lengths_m(pressures_pa, self._near_m)
+        self._near_m = from_pressure if self._pressure_map.converged else None
         return np.where(np.isnan(measured_lengths_m), from_pressure, measured_lengths_m)
 
     def tip(self, lengths_m: Array) -> TipState:

@@ -14,12 +14,18 @@ from enum import Enum, auto
 import numpy as np
 
 from controllers.arm import Arm, Array
-from controllers.frames import rotation_from_vector
+from controllers.frames import rotation_from_vector, rotation_vector
 from controllers.prediction import Prediction
-from controllers.tasks.tip_pose import rotation_vector
 
 #: Time constant (s) by which the estimate follows the measured difference, and its scatter.
 _FAST_S, _SCATTER_S = 0.02, 0.5
+
+#: A tip whose mean of 30 ms is nearer (m) than this to that of 200 ms stands still. A chamber that
+#: sticks must be pushed through its dead band; an arm that swings must not be pushed at its swing.
+_QUICK_S, _SLOW_S, _STILL_M = 0.03, 0.2, 2e-4
+
+#: The correction of a tip that stands still goes so many times faster.
+_WHEN_STILL = 2.0
 
 #: An estimate is never told to be better than this (m): no camera sees an arm more exactly.
 _LEAST_SIGMA_M = 5e-5
@@ -46,6 +52,8 @@ class FeedbackSettings:
     length_sigma_m: float = 0.01
     dither_pa: float = 1500.0
     dither_period_s: float = 0.03
+    hysteresis_share: float = 0.45
+    hysteresis_share_moving: float = 0.65
 
 
 class Verdict(Enum):
@@ -72,6 +80,7 @@ class TipObserver:
         self._turn = np.zeros(3)
         self._residual, self._fast = np.zeros(3), np.zeros(3)
         self._variance_m2 = settings.model_sigma_m**2
+        self._quick, self._slow = np.zeros(3), np.zeros(3)
         self._since_pose_s = math.inf
         self._since_taken_s = math.inf
         self._candidate: Array | None = None
@@ -86,7 +95,7 @@ class TipObserver:
         if verdict is Verdict.REFUSED:
             self.refused += 1
             return verdict
-        self._take(residual, verdict is Verdict.TAKEN and self.seen)
+        self._take(residual, position_m, verdict is Verdict.TAKEN and self.seen)
         self._follow_turn(rotation_vector(rotation @ turned.T))
         return verdict
 
@@ -96,6 +105,8 @@ class TipObserver:
         self._since_pose_s = 0.0
         never = math.isinf(self._since_taken_s)
         largest = 3.0 * settings.model_sigma_m if never else settings.jump_max_m
+        if not never and pause_s > settings.timeout_s:  # what was not seen may have wandered
+            largest += settings.rate_max_m_s * pause_s
         if _norm(residual - self._residual) <= largest:
             self._candidate = None
             return Verdict.TAKEN
@@ -111,17 +122,19 @@ class TipObserver:
         self._candidate = None
         return Verdict.ACCEPTED_ANEW
 
-    def _take(self, residual: Array, continued: bool) -> None:
+    def _take(self, residual: Array, position_m: Array, continued: bool) -> None:
         pause_s = min(self._since_taken_s, 1.0)
         self._residual = residual
         if continued:
             change = residual - self._fast
             share = 1.0 - math.exp(-pause_s / _FAST_S)
             self._fast = self._fast + share * change
+            self._quick = self._quick + min(1.0, pause_s / _QUICK_S) * (position_m - self._quick)
+            self._slow = self._slow + min(1.0, pause_s / _SLOW_S) * (position_m - self._slow)
             rest = math.exp(-pause_s / _SCATTER_S)
             self._variance_m2 += (1.0 - rest) * (float(change @ change) - self._variance_m2)
         else:
-            self._fast = residual
+            self._fast, self._quick, self._slow = residual, position_m, position_m
             self._variance_m2 = (0.1 * self._settings.model_sigma_m) ** 2
         self._since_taken_s, self.seen = 0.0, True
 
@@ -146,6 +159,8 @@ class TipObserver:
         size = _norm(difference)
         if size > self._settings.deadband_m:
             share = self._period_s / self._settings.time_constant_s
+            if _norm(self._quick - self._slow) < _STILL_M:
+                share *= _WHEN_STILL
             share = min(share, self._settings.rate_max_m_s * self._period_s / size)
             self.offset_m = self.offset_m + share * difference
 

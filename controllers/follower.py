@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.arm import Array, Response
-from controllers.frames import rotation_from_vector
+from controllers.frames import rotation_from_vector, rotation_vector
 from controllers.kinematics.compiled import TipState
 from controllers.targets import PoseTarget, PositionTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import (
     quaternion_from_rotation,
     rotation_from_quaternion,
-    rotation_vector,
 )
 from controllers.trajectory import Goal, Motion, Reference, ReferenceLimits, standing
 
@@ -246,11 +245,17 @@ class Follower:
         jerk = np.minimum(np.maximum(jerk, -self._jerk_max), self._jerk_max)
         rate = velocity[:3] + lead.velocity_s * self._acceleration + lead.acceleration_s2 * jerk
         if reference is self._position:
-            return PositionTarget(ahead, self._target.law, rate)
+            return PositionTarget(ahead, self._target.law, rate, self._nearest_m())
         # The law follows a pose by its gain alone, 1 / gain behind.
         ahead += (velocity + lead.velocity_s * acceleration) / self._gain_per_s
         turned = rotation_from_vector(ahead[3:]) @ self._chart
         return PoseTarget(ahead[:3], quaternion_from_rotation(turned), self._target.law)
+
+    def _nearest_m(self) -> Array | None:
+        """Lengths nearest to a position out of reach, once the reference stands there."""
+        if isinstance(self._target, PositionTarget) and self.arrived:
+            return self._target.nearest_lengths_m
+        return None
 
     def _stand_in_the_end(self, reference: Reference) -> None:
         """Come to rest where a shape is over, or at the last position of a stream."""

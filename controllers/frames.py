@@ -4,6 +4,7 @@ A transform is ``(rotation (3, 3), position (3,))``: it takes coordinates of the
 name to the first.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,6 +30,27 @@ class Transform:
         """Undo it."""
         back: Array = self.rotation.T
         return Transform(back, -(back @ self.position_m))
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """Axis times angle (3,), rad, of a rotation matrix (3, 3); angles up to pi."""
+    axial = 0.5 * np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    sine = float(np.sqrt(axial @ axial))
+    cosine = 0.5 * (float(np.trace(rotation)) - 1.0)
+    if sine > 1e-9:
+        return axial * (math.atan2(sine, cosine) / sine)
+    if cosine > 0.0:
+        return axial
+    # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
+    column = np.argmax(np.diag(rotation))
+    axis: Array = rotation[:, column] + np.eye(3)[column]
+    return axis * (math.pi / float(np.linalg.norm(axis)))
 
 
 def rotation_from_vector(vector_rad: Array) -> Array:
@@ -60,7 +82,7 @@ class Frames:
     of the tip to its marker; ``tool_m`` is the tool point in the tip frame.
     """
 
-    mocap_frame: str = "mocap"
+    mocap_frame: str = ""
     mocap_to_base: Transform = field(default_factory=Transform)
     tip_to_marker: Transform = field(default_factory=Transform)
     tool_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -72,12 +94,11 @@ class Frames:
         """
         if frame_id == "base":
             in_base = marker
-        elif frame_id == self.mocap_frame:
+        elif frame_id and frame_id == self.mocap_frame:
             in_base = self.mocap_to_base @ marker
         else:
-            raise InvalidInput(
-                f"frame_id = {frame_id!r}: unknown frame; allowed: 'base', {self.mocap_frame!r}"
-            )
+            known = f"'base', {self.mocap_frame!r}" if self.mocap_frame else "'base'"
+            raise InvalidInput(f"frame_id = {frame_id!r}: unknown frame; allowed: {known}")
         tip = in_base @ self.tip_to_marker
         return tip @ Transform(position_m=np.array(self.tool_m))
 

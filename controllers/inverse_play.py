@@ -24,14 +24,18 @@ class InversePlay:
         self._width_pa = arm.per_chamber("hysteresis_pa")
         self._crossing_pa = np.maximum(CROSSING * self._width_pa, 1e-9)
         self._side = np.zeros_like(self._width_pa)
+        #: Share of the play that is led across: less where feedback does the rest, and must not
+        #: be kicked by a width that is a little too large.
+        self.share = 1.0
         self._acting_pa = np.zeros_like(self._width_pa)
         self.none = not self._width_pa.any()
 
     def start_from(self, sent_pa: Array) -> Array:
         """Take note of pressures that were reached without it; return those that act then."""
-        low, high = sent_pa - self._width_pa, sent_pa + self._width_pa
+        width_pa = self.share * self._width_pa
+        low, high = sent_pa - width_pa, sent_pa + width_pa
         self._acting_pa = np.minimum(np.maximum(self._acting_pa, low), high)
-        self._side = (sent_pa - self._acting_pa) / np.maximum(self._width_pa, 1e-9)
+        self._side = (sent_pa - self._acting_pa) / np.maximum(width_pa, 1e-9)
         return self._acting_pa
 
     def sent_pa(self, acting_pa: Array, to_slack: bool = False) -> Array:
@@ -46,4 +50,4 @@ class InversePlay:
             self._side = np.copysign(left, self._side)
         else:
             self._side = np.minimum(np.maximum(self._side + moved, -1.0), 1.0)
-        return acting_pa + self._width_pa * self._side
+        return acting_pa + self.share * self._width_pa * self._side

@@ -1,29 +1,22 @@
 """Inverse kinematics as a QP under limits, with a fallback that is always available."""
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.compiled import TipState
-from controllers.law import LawStep, Limits, clamped_step
+from controllers.arm import Array
 from controllers.resolved_rate import ResolvedRate
-from controllers.solve_ik import IkSolver, build_ik
-from controllers.tasks.task import Task
+from controllers.solve_ik import IkProblem, IkSolver
 
 
 class QpIk:
-    """Least squares of the task under length, length rate and bend; OSQP underneath."""
+    """Least squares of the tasks under the limits; OSQP underneath."""
 
-    def __init__(self, arm: Arm, limits: Limits) -> None:
-        self._limits = limits
-        self._rows = (limits.length, limits.rate, limits.bend)
-        self._solver = IkSolver(arm.n_chambers, self._rows)
-        self._fallback = ResolvedRate(limits)
+    def __init__(self, solver: IkSolver) -> None:
+        self._solver = solver
+        self._fallback = ResolvedRate()
+        self.fallbacks = 0
 
-    def step(self, task: Task, tip: TipState, lengths_m: Array, dt_s: float) -> LawStep:
-        """Return lengths one tick later; by the damped law where OSQP's result is not usable."""
-        rate, jacobian = task.rate_and_jacobian(tip, lengths_m)
-        largest = self._limits.rate.rate_max_m_s * dt_s
-        problem = build_ik(rate, jacobian, self._rows, lengths_m, largest, dt_s)
-        step = self._solver.solve(problem)
-        if step is None:
-            damped = self._fallback.step(task, tip, lengths_m, dt_s)
-            return LawStep(damped.lengths_m, fell_back=True)
-        return LawStep(clamped_step(self._limits, lengths_m, step, dt_s))
+    def wish(self, problem: IkProblem) -> Array | None:
+        """Return rates (n_chambers,); by the damped law where OSQP's result is not usable."""
+        x = self._solver.solve(problem)
+        if x is None:
+            self.fallbacks += 1
+            return self._fallback.wish(problem)
+        return x

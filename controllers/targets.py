@@ -24,6 +24,9 @@ class TargetKind(IntEnum):
     TWIST = 3
     LENGTHS = 4
     PRESSURES = 5
+    DIRECTION = 6
+    POINT = 7
+    TASKS = 8
     TRAJECTORY = 10
     CIRCLE = 11
     LINE = 12
@@ -31,11 +34,17 @@ class TargetKind(IntEnum):
 
 @dataclass(frozen=True)
 class PositionTarget:
-    """Tip at ``position_m`` (3,), a point that moves with ``velocity_m_s`` (3,) if one is given."""
+    """Tip at ``position_m`` (3,), a point that moves with ``velocity_m_s`` (3,) if one is given.
+
+    ``nearest_lengths_m`` (n_sections, 3) are the lengths that bring the tip nearest, for a position
+    out of reach, from :meth:`controllers.kinematics.workspace.Workspace.is_reachable`: finding them
+    takes too long for a tick.
+    """
 
     position_m: Array
     law: LawName = LawName.DEFAULT
     velocity_m_s: Array | None = None
+    nearest_lengths_m: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,44 @@ class PressuresTarget:
 
 
 @dataclass(frozen=True)
+class DirectionTarget:
+    """The tip's z axis along ``direction`` (3,), a unit vector; roll and position free."""
+
+    direction: Array
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class PointTarget:
+    """The backbone's point at ``station`` (0 the base, 1 the tip) at ``position_m`` (3,)."""
+
+    position_m: Array
+    station: float
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
+class PostureTarget:
+    """Chambers near the middle of their bounds, with what other tasks leave; only in a list."""
+
+    law: LawName = LawName.DEFAULT
+
+
+WeightedTarget = (
+    PositionTarget | PoseTarget | LengthsTarget | DirectionTarget | PointTarget | PostureTarget
+)
+
+
+@dataclass(frozen=True)
+class TasksTarget:
+    """Several at once; ``weights`` has a row a task: its weight, and a pose's for orientation."""
+
+    targets: tuple[WeightedTarget, ...]
+    weights: tuple[tuple[float, float], ...]
+    law: LawName = LawName.DEFAULT
+
+
+@dataclass(frozen=True)
 class ShapeTarget:
     """Tip along a shape, whose own time begins when its ``key`` first arrives."""
 
@@ -101,6 +148,9 @@ Target = (
     | TwistTarget
     | LengthsTarget
     | PressuresTarget
+    | DirectionTarget
+    | PointTarget
+    | TasksTarget
     | TrajectoryTarget
     | CircleTarget
     | LineTarget
@@ -112,6 +162,9 @@ KIND_OF = {
     TwistTarget: TargetKind.TWIST,
     LengthsTarget: TargetKind.LENGTHS,
     PressuresTarget: TargetKind.PRESSURES,
+    DirectionTarget: TargetKind.DIRECTION,
+    PointTarget: TargetKind.POINT,
+    TasksTarget: TargetKind.TASKS,
     TrajectoryTarget: TargetKind.TRAJECTORY,
     CircleTarget: TargetKind.CIRCLE,
     LineTarget: TargetKind.LINE,

@@ -27,9 +27,9 @@ _AGREED_S = 1e-9
 class ReferenceLimits:
     """How fast (m/s), how hard (m/s^2) and how suddenly (m/s^3) the reference may move."""
 
-    speed_m_s: float = 0.4
-    acceleration_m_s2: float = 4.0
-    jerk_m_s3: float = 80.0
+    speed_m_s: float = 0.5
+    acceleration_m_s2: float = 2.0
+    jerk_m_s3: float = 20.0
 
 
 class Motion(NamedTuple):
@@ -58,7 +58,8 @@ class Reference:
         self._acceleration = [_SHARE * share * axis.acceleration_m_s2 for axis in axes]
         self._otg, self._input = Ruckig(self.size), InputParameter(self.size)
         self._input.max_velocity = [share * axis.speed_m_s for axis in axes]
-        self._input.max_acceleration = [share * axis.acceleration_m_s2 for axis in axes]
+        self._acceleration_max = [share * axis.acceleration_m_s2 for axis in axes]
+        self._input.max_acceleration = self._acceleration_max
         self._input.max_jerk = [share * axis.jerk_m_s3 for axis in axes]
         self._input.synchronization = Synchronization.Phase
         self.error = ""
@@ -73,7 +74,7 @@ class Reference:
         """Be at a position, moving or not, with nowhere to go yet but to rest there."""
         zeros = [0.0] * self.size
         moving = _clipped(velocity or zeros, self._speed)
-        self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration))
+        self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration_max))
         self._goal = standing(position)
         self._plan: Trajectory | None = None
         self._since_s = 0.0
@@ -91,7 +92,7 @@ class Reference:
         now = self.now
         request = self._input
         request.current_position, request.current_velocity = now.position, now.velocity
-        request.current_acceleration = _clipped(now.acceleration, self._acceleration)
+        request.current_acceleration = _clipped(now.acceleration, self._acceleration_max)
         plan, at_s = Trajectory(self.size), 0.0
         request.minimum_duration = None
         self.error = ""

@@ -16,7 +16,7 @@ from pymodbus.pdu.register_message import (
 from hardware.transport_faults import TransportFaults
 
 _ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _BUSY = 1, 2, 6
-_STEP_S = 0.005
+_STEP_S = 0.01
 
 
 class EmulatedTerminal(Protocol):
@@ -80,7 +80,7 @@ class ModbusServer:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._connections.add(writer)
         data = b""
-        with contextlib.suppress(OSError, asyncio.IncompleteReadError):
+        with contextlib.suppress(OSError, asyncio.CancelledError):
             while received := await reader.read(4096):
                 data += received
                 while True:

@@ -22,6 +22,24 @@ from hardware.serial_faults import SerialFaults
 _PASS_S = 0.002
 
 
+#: How much of its physics an emulated arm calculates in one pass at most (s).
+_LARGEST_ADVANCE_S = 0.02
+
+
+class SlowMotion:
+    """Time of an emulated arm: on a busy machine it falls behind, and its host need not wait."""
+
+    def __init__(self) -> None:
+        self._now_s: float | None = None
+
+    def until(self, time_s: float) -> float:
+        """Return up to when to calculate now; it catches up where it can."""
+        if self._now_s is None:
+            self._now_s = time_s
+        self._now_s = min(time_s, self._now_s + _LARGEST_ADVANCE_S)
+        return self._now_s
+
+
 class SerialEmulator(Protocol):
     """A device that answers bytes with bytes."""
 

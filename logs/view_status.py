@@ -5,7 +5,7 @@ import numpy as np
 from controllers.arm import Array
 from logs.schema import pneuarm_pb2 as pb
 
-_BINDING = {1: "length", 2: "bend", 4: "pressure"}
+_BINDING = {1: "length", 2: "bend", 4: "pressure", 8: "keep-out"}
 _GUARD = {1: "range", 2: "slew", 4: "not finite", 8: "too old", 16: "supply"}
 
 

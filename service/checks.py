@@ -6,17 +6,26 @@ from google.protobuf.message import Message
 
 from controllers.actuation import length_bounds_m
 from controllers.arm import Arm, Array
-from controllers.errors import TargetRejected
+from controllers.errors import InvalidInput, TargetRejected
+from controllers.frames import Frames, Transform
 from controllers.targets import (
+    DirectionTarget,
     LawName,
     LengthsTarget,
+    PointTarget,
     PoseTarget,
     PositionTarget,
+    PostureTarget,
     PressuresTarget,
     Target,
+    TasksTarget,
     TwistTarget,
+    WeightedTarget,
 )
+from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
+from controllers.trajectory import ReferenceLimits
 from logs.schema import pneuarm_pb2 as pb
+from service.shape_checks import ShapeChecker
 
 #: A position farther than this many arm lengths is not a position in metres.
 FARTHEST_ARM_LENGTHS = 3.0
@@ -27,12 +36,25 @@ FASTEST_RAD_S = 20.0
 
 _UNIT_TOLERANCE = 1e-3
 
+#: Weights count beside each other; beyond this the QP loses the digits of the others.
+_HEAVIEST = 1e3
+
+#: Tasks that ask for the same thing, so that only one of them can be meant.
+_CONTRADICTORY = (("position", "pose"), ("direction", "pose"))
+
 
 class TargetChecker:
     """Turns target messages for one arm into checked targets; raises TargetRejected."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        frames: Frames | None = None,
+        reference: ReferenceLimits | None = None,
+    ) -> None:
         self._arm = arm
+        self._frames = frames or Frames()
+        self._shapes = ShapeChecker(arm, reference or ReferenceLimits(), self._position)
         self._farthest_m = FARTHEST_ARM_LENGTHS * arm.max_length_m
         self._length_low, self._length_high = length_bounds_m(arm)
         self._pressure_low = arm.per_chamber("pressure_min_pa")
@@ -45,7 +67,7 @@ class TargetChecker:
             case "position":
                 _require(message.position, "position_m")
                 position = self._position(message.position.frame_id, message.position.position_m)
-                return PositionTarget(position, law)
+                return PositionTarget(position, law, _velocity(message.position))
             case "pose":
                 _require(message.pose, "position_m", "orientation")
                 position = self._position(message.pose.frame_id, message.pose.position_m)
@@ -56,27 +78,110 @@ class TargetChecker:
                 return LengthsTarget(self._lengths(message.lengths), law)
             case "pressures":
                 return PressuresTarget(self._pressures(message.pressures), law)
+            case "direction":
+                return DirectionTarget(_direction(message.direction), law)
+            case "point":
+                return self._point(message.point, law)
+            case "tasks":
+                return self._tasks(message.tasks, law)
+            case "trajectory" | "circle" | "line":
+                return self._shapes.target(message, law)
         raise TargetRejected(
-            "the message holds no target; one of position, pose, twist, lengths, pressures"
+            "the message holds no target; one of position, pose, twist, lengths, pressures, "
+            "direction, point, tasks, trajectory, circle, line"
+        )
+
+    def _point(self, message: pb.PointTarget, law: LawName = LawName.DEFAULT) -> PointTarget:
+        _require(message, "position_m")
+        if not 0.0 < message.station <= 1.0:  # never true of a NaN
+            raise TargetRejected(
+                f"station = {message.station:g}; allowed: above 0 (the base) to 1 (the tip)"
+            )
+        position = self._position(message.frame_id, message.position_m)
+        along = message.station * self._arm.n_sections
+        shares = np.clip(along - np.arange(self._arm.n_sections), 0.0, 1.0)
+        longest = float(shares @ self._arm.per_section("length_max_m")[:, 0])
+        distance = float(np.linalg.norm(position))
+        if distance > longest:
+            raise TargetRejected(
+                f"position_m = {_list(position)} is {distance:.3g} m from the base, but the "
+                f"backbone at station {message.station:g} reaches at most {longest:.3g} m"
+            )
+        return PointTarget(position, message.station, law)
+
+    def _tasks(self, message: pb.TasksTarget, law: LawName) -> TasksTarget:
+        kinds = [task.WhichOneof("task") for task in message.tasks]
+        if not [kind for kind in kinds if kind not in (None, "posture")]:
+            raise TargetRejected("tasks holds no task besides posture; at least one is needed")
+        for kind in kinds:
+            if kinds.count(kind) > 1:
+                raise TargetRejected(
+                    f"tasks holds {kind or 'an empty task'} twice; once is allowed"
+                )
+        for one, other in _CONTRADICTORY:
+            if one in kinds and other in kinds:
+                raise TargetRejected(f"tasks holds {one} and {other}, which contradict; drop one")
+        if "position" in kinds + ["position"] * ("pose" in kinds) and any(
+            task.HasField("point") and task.point.station == 1.0 for task in message.tasks
+        ):
+            raise TargetRejected(
+                "tasks holds a point at station 1, the tip, besides the tip's position; drop one"
+            )
+        targets = tuple(self._task(task) for task in message.tasks)
+        return TasksTarget(targets, tuple(_weights(task) for task in message.tasks), law)
+
+    def _task(self, message: pb.WeightedTask) -> WeightedTarget:
+        """Check one of several tasks."""
+        match message.WhichOneof("task"):
+            case "position":
+                _require(message.position, "position_m")
+                position = message.position
+                return PositionTarget(self._position(position.frame_id, position.position_m))
+            case "pose":
+                _require(message.pose, "position_m", "orientation")
+                place = self._position(message.pose.frame_id, message.pose.position_m)
+                return PoseTarget(place, _quaternion(message.pose.orientation))
+            case "direction":
+                return DirectionTarget(_direction(message.direction))
+            case "point":
+                return self._point(message.point)
+            case "lengths":
+                return LengthsTarget(self._lengths(message.lengths))
+            case "posture":
+                return PostureTarget()
+        raise TargetRejected(
+            "an empty task; one of position, pose, direction, point, lengths, posture"
         )
 
     def tip_pose(self, message: PoseInFrame) -> tuple[Array, Array]:
-        """Check a measured tip pose; return position (3,) and quaternion (4,)."""
+        """Check a measured marker pose; return the tip's position (3,) and quaternion (4,).
+
+        Both are in the base frame; the position is the tool point's.
+        """
         _require(message, "pose")
         _require(message.pose, "position", "orientation")
-        position = self._position(message.frame_id, message.pose.position)
-        return position, _quaternion(message.pose.orientation)
+        rotation = rotation_from_quaternion(_quaternion(message.pose.orientation))
+        marker = Transform(rotation, _vector("position", message.pose.position))
+        try:
+            tool = self._frames.tool_pose(marker, message.frame_id)
+        except InvalidInput as error:
+            raise TargetRejected(str(error)) from error
+        self._check_near(tool.position_m)
+        return tool.position_m, quaternion_from_rotation(tool.rotation)
 
     def _position(self, frame_id: str, vector: object) -> Array:
         _check_frame(frame_id, ("base",))
         position = _vector("position_m", vector)
+        self._check_near(position)
+        return position
+
+    def _check_near(self, position: Array) -> None:
         distance = float(np.linalg.norm(position))
         if distance > self._farthest_m:
             raise TargetRejected(
                 f"position_m = {_list(position)} is {distance:.3g} m from the base, more than "
                 f"{FARTHEST_ARM_LENGTHS:g} arm lengths; is it in mm?"
             )
-        return position
 
     def _lengths(self, message: pb.LengthsTarget) -> Array:
         return self._chambers(
@@ -118,6 +223,17 @@ def _law(number: int) -> LawName:
         ) from None
 
 
+def _velocity(message: pb.PositionTarget) -> Array | None:
+    if not message.HasField("velocity_m_s"):
+        return None
+    velocity = _vector("velocity_m_s", message.velocity_m_s)
+    if np.linalg.norm(velocity) > FASTEST_M_S:
+        raise TargetRejected(
+            f"velocity_m_s = {_list(velocity)} is above {FASTEST_M_S:g} m/s; is it in mm/s?"
+        )
+    return velocity
+
+
 def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:
     _check_frame(message.frame_id, ("base", "tip"))
     if message.reference_point not in ("base", "tip"):
@@ -145,6 +261,28 @@ def _twist(message: pb.TwistTarget, law: LawName) -> TwistTarget:
     if in_tip_frame and about_base:
         raise TargetRejected("frame_id = 'tip' goes with reference_point = 'tip' only")
     return TwistTarget(linear, angular, in_tip_frame, about_base, law)
+
+
+def _direction(message: pb.DirectionTarget) -> Array:
+    _check_frame(message.frame_id, ("base",))
+    _require(message, "direction")
+    direction = _vector("direction", message.direction)
+    norm = float(np.linalg.norm(direction))
+    if not 1e-6 < norm < 1e6:
+        raise TargetRejected(f"direction = {_list(direction)} points nowhere; give a unit vector")
+    return direction / norm
+
+
+def _weights(message: pb.WeightedTask) -> tuple[float, float]:
+    for name in ("weight", "orientation_weight"):
+        weight = getattr(message, name)
+        left_out = name == "orientation_weight" and weight == 0.0
+        if not (0.0 < weight <= _HEAVIEST or left_out):
+            raise TargetRejected(
+                f"{name} of task {message.WhichOneof('task')} is {weight:g}; allowed: above 0 to "
+                f"{_HEAVIEST:g}; leave out a task that is not to count"
+            )
+    return message.weight, message.orientation_weight or message.weight
 
 
 def _require(message: Message, *names: str) -> None:

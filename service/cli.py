@@ -42,6 +42,12 @@ def _emulate(arguments: argparse.Namespace) -> int:
     return emulate(arguments)
 
 
+def _emulate_camera(arguments: argparse.Namespace) -> int:
+    from service.camera import emulate_camera
+
+    return emulate_camera(arguments)
+
+
 def _send(arguments: argparse.Namespace) -> int:
     from service.commands_client import send
 
@@ -150,14 +156,34 @@ def _add_daemon(commands: Subparsers) -> None:
 
 
 def _add_emulate(commands: Subparsers) -> None:
-    emulate = _command(commands, "emulate", _emulate, "A device without the device, for tests.")
-    emulate.add_argument("what", choices=EMULATED)
-    emulate.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
-    emulate.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
-    emulate.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
-    emulate.add_argument("--record", type=Path, metavar="FILE", help="what reaches it, JSON lines")
-    emulate.add_argument("--watchdog-ms", type=int, help="its own watchdog at power-on")
-    emulate.add_argument("--fail-safe", choices=("reset", "hold"), default="reset")
+    help_text = "A device without the device, for tests."
+    emulate = commands.add_parser("emulate", help=help_text, description=help_text)
+    devices = emulate.add_subparsers(dest="what", required=True, metavar="DEVICE")
+    for name in EMULATED:
+        _add_emulated_device(devices, name)
+    _add_emulated_camera(devices)
+
+
+def _add_emulated_device(devices: Subparsers, name: str) -> None:
+    device = _command(devices, name, _emulate, f"{name}, with the simulated arm behind it.")
+    device.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
+    device.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
+    device.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
+    device.add_argument("--record", type=Path, metavar="FILE", help="what reaches it, JSON lines")
+    device.add_argument("--watchdog-ms", type=int, help="its own watchdog at power-on")
+    device.add_argument("--fail-safe", choices=("reset", "hold"), default="reset")
+
+
+def _add_emulated_camera(devices: Subparsers) -> None:
+    help_text = "Motion capture that sees the tip of a simulated arm."
+    camera = _command(devices, "camera", _emulate_camera, help_text)
+    camera.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
+    camera.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
+    camera.add_argument("--rate", type=float, default=100.0, help="poses a second (100)")
+    camera.add_argument("--delay-ms", type=float, default=10.0, help="age of a pose (10)")
+    camera.add_argument("--noise-mm", type=float, default=0.1, help="on every axis (0.1)")
+    camera.add_argument("--seed", type=int, default=0, help="seed of the noise")
+    camera.add_argument("--seconds", type=float, default=0.0, help="end after (0: Ctrl-C)")
 
 
 def _add_client(commands: Subparsers) -> None:
@@ -167,14 +193,19 @@ def _add_client(commands: Subparsers) -> None:
     kinds = send.add_subparsers(dest="kind", required=True, metavar="KIND")
     position = kinds.add_parser("position", help="tip position in the base frame, mm")
     pose = kinds.add_parser("pose", help="tip position, mm, and quaternion x y z w")
+    direction = kinds.add_parser("direction", help="where the tip points, in the base frame")
+    point = kinds.add_parser("point", help="a point of the backbone at a position, mm")
     twist = kinds.add_parser("twist", help="tip velocity, mm/s, for some seconds")
     # One name for all values: where some are missing, argparse cannot tell a tuple of names.
     for parser, count, names in (
         (position, 3, "X Y Z, mm"),
         (pose, 7, "X Y Z, mm, QX QY QZ QW"),
+        (direction, 3, "DX DY DZ"),
+        (point, 3, "X Y Z, mm"),
         (twist, 3, "VX VY VZ, mm/s"),
     ):
         parser.add_argument("values", nargs=count, type=float, metavar="VALUE", help=names)
+    point.add_argument("--station", type=float, required=True, help="0 the base, 1 the tip")
     twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")
     twist.add_argument("--frame", choices=("base", "tip"), default="base")
     twist.add_argument("--point", choices=("tip", "base"), default="tip", help="reference point")
@@ -183,7 +214,8 @@ def _add_client(commands: Subparsers) -> None:
     pressures = kinds.add_parser("pressures", help="gauge pressures, three a section, bar")
     for parser in (lengths, pressures):
         parser.add_argument("values", nargs="+", type=float, metavar="VALUE")
-    for parser in (position, pose, twist, lengths, pressures):
+    shapes = _add_shapes(kinds)
+    for parser in (position, pose, direction, point, twist, lengths, pressures, *shapes):
         _add_connection(parser)
         parser.add_argument("--enable", action="store_true", help="arm first")
         parser.add_argument("--take-over", action="store_true", help="take the lease from another")
@@ -204,6 +236,21 @@ def _add_client(commands: Subparsers) -> None:
     state = _command(commands, "state", _state, "Show the newest state.")
     state.add_argument("--follow", action="store_true", help="go on until Ctrl-C")
     _add_connection(state)
+
+
+def _add_shapes(kinds: Subparsers) -> list[argparse.ArgumentParser]:
+    circle = kinds.add_parser("circle", help="tip on a circle: center and radius, mm")
+    circle.add_argument("values", nargs=4, type=float, metavar="VALUE", help="X Y Z RADIUS, mm")
+    circle.add_argument("--frequency", type=float, default=0.25, help="turns a second (0.25)")
+    circle.add_argument("--turns", type=float, default=1.0)
+    circle.add_argument("--normal", nargs=3, type=float, default=(0.0, 0.0, 1.0), metavar="N")
+    line = kinds.add_parser("line", help="tip from one point to another and back, mm")
+    line.add_argument("values", nargs=6, type=float, metavar="VALUE", help="X Y Z X Y Z, mm")
+    line.add_argument("--period", type=float, default=4.0, help="s, there and back (4)")
+    line.add_argument("--repeats", type=float, default=1.0)
+    trajectory = kinds.add_parser("trajectory", help="tip through timed waypoints of a file")
+    trajectory.add_argument("file", type=Path, help="lines of: time in s, then x y z in mm")
+    return [circle, line, trajectory]
 
 
 def _add_connection(parser: argparse.ArgumentParser) -> None:

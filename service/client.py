@@ -250,9 +250,14 @@ class Client:
         self._targets.put(target.SerializeToString())
         return self._sequence
 
-    def send_position(self, position_m: Vector, law: "pb.Law" = pb.DEFAULT) -> int:
-        """Send a tip position (3,) in the base frame, m."""
-        return self.send(position_target(position_m, law))
+    def send_position(
+        self,
+        position_m: Vector,
+        law: "pb.Law" = pb.DEFAULT,
+        velocity_m_s: Vector | None = None,
+    ) -> int:
+        """Send a tip position (3,) in the base frame, m; in a stream also its velocity."""
+        return self.send(position_target(position_m, law, velocity_m_s))
 
     def send_pose(
         self, position_m: Vector, quaternion_xyzw: Vector, law: "pb.Law" = pb.DEFAULT

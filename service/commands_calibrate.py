@@ -10,7 +10,7 @@ from typing import Any
 from controllers.calibration.calibrate import Calibration, calibrate
 from controllers.calibration.plan import duration_s, plan
 from controllers.calibration.recording import Recording
-from service.calibration.drive import progress, record
+from service.calibration.drive import progress, record, require_tip
 from service.calibration.files import require_folder, toml_text, write_whole
 from service.calibration.page import page
 from service.calibration.recordings import read_logs, require_seen
@@ -28,7 +28,6 @@ def run(arguments: argparse.Namespace) -> int:
     configuration, recording = (
         read_logs(arguments.from_logs, arguments.arm) if arguments.from_logs else _live(arguments)
     )
-    require_seen(recording)
     print("fitting ...", file=sys.stderr, flush=True)
     found = calibrate(configuration.build_arm(), recording, arguments.world)
     text = toml_text(configuration, found)
@@ -44,13 +43,16 @@ def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
         configuration = check(tomllib.loads(client.info().config_toml), "the daemon")
         arm = configuration.build_arm()
         moves = plan(arm)
+        require_tip(client)
         print(
             f"arm {name} moves through {len(moves)} places in {duration_s(moves):.0f} s; keep its "
             "workspace free; Ctrl-C ends it with the arm vented",
             file=sys.stderr,
             flush=True,
         )
-        return configuration, record(client, moves, arm.n_sections, progress())
+        recording = record(client, moves, arm.n_sections, progress())
+    require_seen(recording)
+    return configuration, recording
 
 
 def _tell(arguments: argparse.Namespace, found: Calibration, folder: Path) -> None:

@@ -12,7 +12,14 @@ from controllers.errors import DaemonUnreachable, ModeRefused, NotConfirmed
 from logs.schema import pneuarm_pb2 as pb
 from service.client import Client
 from service.local_stop import stop_locally
-from service.target_messages import pose_target, position_target, twist_target
+from service.shape_arguments import duration_s, shape_of
+from service.target_messages import (
+    direction_target,
+    point_target,
+    pose_target,
+    position_target,
+    twist_target,
+)
 from service.text import outcome, radians, state_line
 
 _LAWS = {None: pb.DEFAULT, "resolved_rate": pb.RESOLVED_RATE, "qp_ik": pb.QP_IK}
@@ -33,13 +40,16 @@ def _show(arguments: argparse.Namespace, message: Message, text: str) -> None:
 
 def target_of(arguments: argparse.Namespace) -> pb.Target:
     """Return the target of a `send` command, in SI units."""
-    law = _LAWS[arguments.law]
-    values = arguments.values
+    law, values = _LAWS[arguments.law], getattr(arguments, "values", [])
     match arguments.kind:
         case "position":
             return position_target([1e-3 * value for value in values], law)
         case "pose":
             return pose_target([1e-3 * value for value in values[:3]], values[3:], law)
+        case "direction":
+            return direction_target(values, law)
+        case "point":
+            return point_target([1e-3 * value for value in values], arguments.station, law)
         case "twist":
             linear = [1e-3 * value for value in values]
             angular = radians(arguments.angular)
@@ -47,6 +57,8 @@ def target_of(arguments: argparse.Namespace) -> pb.Target:
         case "lengths":
             lengths = pb.LengthsTarget(length_m=[1e-3 * value for value in values])
             return pb.Target(lengths=lengths, law=law)
+        case "circle" | "line" | "trajectory":
+            return shape_of(arguments, law)
     pressures = pb.PressuresTarget(pressure_pa=[1e5 * value for value in values])
     return pb.Target(pressures=pressures, law=law)
 
@@ -66,7 +78,7 @@ def send(arguments: argparse.Namespace) -> int:
             state = _send_twist(client, target, arguments.seconds)
             text = f"moved for {arguments.seconds:g} s; {state_line(state)}"
         else:
-            state = client.wait_until_reached(target, arguments.timeout)
+            state = client.wait_until_reached(target, arguments.timeout + duration_s(target))
             text = outcome(state)
     _show(arguments, state, text + "; the arm holds")
     return 0 if state.reach != pb.OUT_OF_REACH else 2

@@ -8,6 +8,7 @@ themselves are in :mod:`service.tables`.
 
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -16,11 +17,14 @@ import tomli_w
 from platformdirs import user_state_path
 from pydantic import BaseModel, ValidationError, model_validator
 
-from controllers.arm import Arm
+from controllers.arm import Arm, uncalibrated
+from controllers.consistency import refuse_contradictions
 from controllers.errors import ConfigurationError, InvalidInput
 from service.tables.arm import ArmConfig
 from service.tables.control import ControlConfig
+from service.tables.feedback import FeedbackConfig, ReferenceConfig
 from service.tables.festo import FestoCpxConfig, FestoVtemConfig
+from service.tables.frames import FramesConfig
 from service.tables.hardware import HardwareConfig, SimulatorConfig
 from service.tables.monitors import MonitorsConfig
 from service.tables.outputs import LogConfig, RerunConfig, ZenohConfig
@@ -36,6 +40,9 @@ class Configuration(Table):
     preset: Literal["paper", "table1", "trunk"] = "paper"
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
+    reference: ReferenceConfig = ReferenceConfig()
+    feedback: FeedbackConfig = FeedbackConfig()
+    frames: FramesConfig = FramesConfig()
     hardware: HardwareConfig = HardwareConfig()
     monitors: MonitorsConfig = MonitorsConfig()
     simulator: SimulatorConfig = SimulatorConfig()
@@ -59,11 +66,16 @@ class Configuration(Table):
 
     def build_arm(self) -> Arm:
         """Return the arm that the controller believes in, in SI units."""
-        return self.arm.build()
+        return replace(self.arm.build(), tool_m=self.frames.tool_m())
 
     def build_simulated_arm(self) -> Arm:
-        """Return the arm that the simulator makes real: ``arm`` where nothing else is said."""
-        return (self.simulator.arm or self.arm).build()
+        """Return the arm that the simulator makes real: ``arm`` where nothing else is said.
+
+        Its body has weight, stiffness and hysteresis of its own: those of a calibration are left
+        out.
+        """
+        arm = (self.simulator.arm or self.arm).build()
+        return replace(arm, sections=tuple(uncalibrated(section) for section in arm.sections))
 
     @property
     def device_address(self) -> str:
@@ -104,7 +116,7 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
     """Check tables as a file has them; raises ConfigurationError."""
     try:
         configuration = Configuration.model_validate(tables)
-        configuration.build_arm()
+        refuse_contradictions(configuration.build_arm())
     except ValidationError as error:
         items = error.errors()
         if len(items) > 1:  # a list counts as short because its elements were refused: no news

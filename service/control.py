@@ -46,6 +46,8 @@ class ControlProcess:
         settings = LoopSettings(
             period_s=1.0 / control.rate_hz,
             control=control.settings(),
+            reference=configuration.reference.limits(),
+            feedback=configuration.feedback.settings(),
             timeouts=Timeouts(
                 target_s=control.target_timeout_ms * 1e-3,
                 arming_s=control.arming_timeout_s,

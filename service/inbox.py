@@ -1,11 +1,15 @@
 """What clients stream in: targets and measured tip poses, checked before they go to control."""
 
 import time
+from dataclasses import replace
 
+import numpy as np
 import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
+from controllers.arm import Array
 from controllers.errors import TargetRejected
+from controllers.kinematics.reachability import Reachability
 from controllers.kinematics.workspace import Workspace
 from controllers.targets import PositionTarget, Target
 from logs.codec import decode
@@ -15,11 +19,15 @@ from service.checks import TargetChecker
 from service.commands import Pipe, SetTarget, SetTipPose
 from service.lease import Lease
 from service.notes import Notes
+from service.pose_publisher import PosePublisher
 from service.process import Shared
 from service.publisher import Publisher
 
 #: A client may have seen states that this process has not read from the ring yet.
 _AHEAD_TICKS = 1000
+
+#: For a moving target out of reach the nearest point is searched this often at most.
+_SEARCH_EVERY_NS = 100_000_000
 
 
 class Inbox:
@@ -30,10 +38,16 @@ class Inbox:
     ) -> None:
         control = shared.configuration.control
         self._stream, self._lease, self._publisher, self._notes = stream, lease, publisher, notes
-        self._checker = TargetChecker(shared.configuration.build_arm())
-        arm = shared.configuration.build_arm()
-        self._workspace = Workspace(arm) if arm.n_sections == 1 else None
+        configuration = shared.configuration
+        arm, frames = configuration.build_arm(), configuration.frames.frames()
+        self._checker = TargetChecker(arm, frames, configuration.reference.limits())
+        self._publisher_of_poses = PosePublisher()
+        # With keep-outs the workspace has holes that it does not know; of a tool it knows nothing.
+        known = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
+        self._workspace = Workspace(arm) if known else None
         self._out_of_reach = False
+        self._nearest: tuple[Array, Reachability] | None = None
+        self._searched_ns = 0
         self._rate_hz = control.rate_hz
         self._stale_s = control.target_timeout_ms * 1e-3
 
@@ -51,34 +65,47 @@ class Inbox:
                     message.client_id, message.lease_secret, message.sequence, received_ns * 1e-9
                 )
                 self._check_active()
-            self._stream.send(SetTarget(target, message.sequence, received_ns))
+            told = self._towards_nearest(target, message.client_id, received_ns)
+            self._stream.send(SetTarget(told, message.sequence, received_ns))
         except TargetRejected as error:
             self._notes.reject(TARGET.key, str(error), payload, message.client_id)
             return
-        self._tell_if_out_of_reach(target, message.client_id)
         message.lease_secret = ""  # the log is no place for it
         self._notes.log(TARGET, message, received_ns)
 
-    def _tell_if_out_of_reach(self, target: Target, client: str) -> None:
-        """Say once that a position is out of reach, why, and which point is nearest.
+    def _towards_nearest(self, target: Target, client: str, now_ns: int) -> Target:
+        """Add the lengths of the nearest reachable point to a position out of reach; tell it once.
 
-        Only for one section, where the workspace is known exactly and in microseconds; with more
-        the arm itself finds out, and its state says so.
+        Only for one section, where the workspace is known exactly. Finding the nearest point takes
+        milliseconds, too long for a tick and for every target of a stream: a moving target has to
+        do without between two searches, and goes as near as a straight way leads.
         """
         if self._workspace is None or not isinstance(target, PositionTarget):
-            return
-        outside = not bool(self._workspace.contains(target.position_m))
-        if outside and not self._out_of_reach:  # finding the nearest takes milliseconds
-            answer = self._workspace.is_reachable(target.position_m)
-            names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
-            nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
-            self._notes.tell(
-                "out_of_reach",
-                f"the target is out of reach: {names} binds; the nearest reachable point is "
-                f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
-                client,
-            )
-        self._out_of_reach = outside
+            return target
+        if bool(self._workspace.contains(target.position_m)):
+            self._out_of_reach = False
+            return target
+        if self._nearest is None or not np.array_equal(self._nearest[0], target.position_m):
+            if self._out_of_reach and now_ns - self._searched_ns < _SEARCH_EVERY_NS:
+                return target
+            self._nearest = target.position_m, self._workspace.is_reachable(target.position_m)
+            self._searched_ns = now_ns
+        answer = self._nearest[1]
+        if not self._out_of_reach:
+            self._tell_out_of_reach(answer, client)
+        self._out_of_reach = True
+        lengths = self._workspace.lengths_m(answer.nearest_m)
+        return replace(target, nearest_lengths_m=lengths)
+
+    def _tell_out_of_reach(self, answer: Reachability, client: str) -> None:
+        names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
+        nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
+        self._notes.tell(
+            "out_of_reach",
+            f"the target is out of reach: {names} binds; the nearest reachable point is "
+            f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
+            client,
+        )
 
     def _check_fresh(self, state_sequence: int) -> None:
         newest = self._publisher.newest_sequence
@@ -108,6 +135,7 @@ class Inbox:
         payload = sample.payload.to_bytes()
         try:
             message = decode(PoseInFrame, payload, str(sample.encoding))
+            self._publisher_of_poses.check(sample, message, received_ns * 1e-9)
             position, quaternion = self._checker.tip_pose(message)
         except TargetRejected as error:
             self._notes.reject(TIP_POSE.key, str(error), payload, "")

@@ -35,6 +35,7 @@ from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
 from service.monitors.settings import MonitorSettings
+from service.monitors.watch import measurement_age_s
 from service.safety import Safety
 from service.steering import Steering
 
@@ -45,6 +46,9 @@ NEAR_ZERO_PA = 2000.0
 _GUARD_COUNTS = tuple(
     (int(kind), f"guard_{kind.name.lower()}") for kind in Intervention if kind.name
 )
+
+#: What may happen in every tick is told this often at most.
+_TELL_EVERY_NS = 10_000_000_000
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,7 @@ class Loop:
         self._heartbeat_ns: int | None = None
         self._operator = False
         self._interventions = 0
+        self._told_fallbacks = self._tell_again_ns = 0
         self._now_ns = self._last_ns = settings.start_ns
         self.sequence = 0
 
@@ -267,16 +272,30 @@ class Loop:
         """Return the pressures wanted now, by mode."""
         if self._keeper.mode == Mode.ACTIVE:
             self._wanted = self._steering.step(dt_s)
+            self._tell_fallbacks()
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
-            dither_pa = self._steering.dither_pa(now_s)
-            if not dither_pa:
-                return self._wanted
-            return np.minimum(np.maximum(self._wanted + dither_pa, self._low), self._high)
+            setpoints = self._steering.sent_pa(self._wanted, dt_s, now_s)
+            # Lead and dither stay inside the range; what is wanted beyond it, the guard counts.
+            low, high = np.minimum(self._low, self._wanted), np.maximum(self._high, self._wanted)
+            return np.minimum(np.maximum(setpoints, low), high)
         self._tick["tip_commanded_position_m"] = np.nan
         ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
         if ramping is not None:
             return ramping
-        return self._sent  # hold keeps the last; in the vented modes it is zero already
+        if self._keeper.mode == Mode.HOLD:
+            return self._wanted  # what the chambers have or are about to have, without any lead
+        return self._sent  # in the vented modes it is zero already
+
+    def _tell_fallbacks(self) -> None:
+        """Tell that the QP gave nothing and the damped law went on, once in a while."""
+        count, now_ns = self._controller.fallbacks, self._now_ns
+        if count > self._told_fallbacks and now_ns >= self._tell_again_ns:
+            self._keeper.tell(
+                pb.WARNING,
+                "qp_fallback",
+                f"the QP gave no usable step, the damped law went on instead; {count} times so far",
+            )
+            self._told_fallbacks, self._tell_again_ns = count, now_ns + _TELL_EVERY_NS
 
     def _send(self, wanted: Array, now_s: float) -> None:
         ramping = self._safety.ramping_pa(now_s) is not None
@@ -315,8 +334,7 @@ class Loop:
         tick["guard_interventions"] = self._interventions
         tick["qp_fallbacks"] = controller.fallbacks
         tick["supply_pa"] = measurement.supply_pa
-        taken_s = measurement.taken_s
-        tick["measurement_age_s"] = 0.0 if taken_s is None else self._now_ns * 1e-9 - taken_s
+        tick["measurement_age_s"] = measurement_age_s(measurement, self._now_ns * 1e-9)
         self._fill_estimate(measurement)
         self._fill_target()
         if measurement.true_tip is not None:

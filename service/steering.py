@@ -1,6 +1,7 @@
 """Everything between a target and the pressures of a tick: reference, correction, law, dither."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from controllers.kinematics.compiled import TipState
 from controllers.targets import PoseTarget, PositionTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
+from controllers.valve_lead import ValveLead
 from logs.schema import pneuarm_pb2 as pb
 from service.commands import SetTarget, SetTipPose
 
@@ -22,8 +24,11 @@ Tell = Callable[["pb.Level", str, str, str, str], None]
 
 _NONE = np.full(3, np.nan)
 
-#: The dither grows from nothing in this time (s).
+#: The dither grows from nothing, and a share of the hysteresis from 0 to 1, in this time (s).
 _DITHER_RAMP_S = 0.3
+
+#: A reference faster than this (m/s) moves the arm through its hysteresis by itself.
+_MOVING_M_S = 0.005
 
 
 class Steering:
@@ -43,8 +48,10 @@ class Steering:
     ) -> None:
         self._controller, self._feedback, self._tell = controller, feedback, tell
         gain = controller.settings.gain_per_s
-        self._follower = Follower(reference, lead_of(arm.response), gain)
-        self.observer = TipObserver(arm, feedback, period_s)
+        self._valves = ValveLead(arm.response.lag_s)
+        quick = replace(arm, response=replace(arm.response, lag_s=self._valves.remaining_s))
+        self._follower = Follower(reference, lead_of(quick.response), gain)
+        self.observer = TipObserver(quick, feedback, period_s)
         self._dither = Dither(feedback.dither_pa, feedback.dither_period_s)
         self._vented_m = PressureMap(arm).lengths_m(np.zeros((arm.n_sections, 3)))
         self.tip_m = self._tip_before_m = np.zeros(3)
@@ -52,6 +59,7 @@ class Steering:
         self._seen = self._refusing = False
         self._told_error = ""
         self._near = False
+        self._share = 1.0
         self._dither_since_s: float | None = None
         self._dt_s = period_s
 
@@ -83,6 +91,7 @@ class Steering:
         """Take the commanded lengths from pressures, without a target."""
         self._controller.start_from(pressures_pa)
         self._follower.forget()
+        self._valves.forget()
         self._target = None
         self.tip_m = self._tip_before_m = self._corrected().position_m
 
@@ -122,7 +131,11 @@ class Steering:
         self.tip_m = self._controller.step(dt_s).position_m
         return self._controller.pressures_pa()
 
-    def dither_pa(self, now_s: float) -> float:
+    def sent_pa(self, wanted_pa: Array, dt_s: float, now_s: float) -> Array:
+        """Setpoints for the valves, ahead of the wanted pressures, with the dither."""
+        return self._valves.sent_pa(wanted_pa, dt_s) + self._dither_pa(now_s)
+
+    def _dither_pa(self, now_s: float) -> float:
         """What is added to every setpoint.
 
         Only a followed target whose tip is measured needs it; a camera lost on the way changes
@@ -130,13 +143,25 @@ class Steering:
         """
         if self._target is None:
             self._dither_since_s = None
+            self._share = 1.0
+            self._controller.set_hysteresis_share(1.0)
             return 0.0
         if self._dither_since_s is None:
             if not (self.observer.seen and self._feedback.enabled):
                 return 0.0
             self._dither_since_s = now_s
         share = min(1.0, (now_s - self._dither_since_s) / _DITHER_RAMP_S)
+        self._follow_share()
         return share * self._dither.at_pa(now_s)
+
+    def _follow_share(self) -> None:
+        """Let the inverted share of the hysteresis go to that of an arm that moves, or rests."""
+        motion, feedback = self._follower.motion, self._feedback
+        moving = motion is not None and max(map(abs, motion.velocity[:3])) > _MOVING_M_S
+        wanted = feedback.hysteresis_share_moving if moving else feedback.hysteresis_share
+        largest = self._dt_s / _DITHER_RAMP_S
+        self._share += min(max(wanted - self._share, -largest), largest)
+        self._controller.set_hysteresis_share(self._share)
 
     def observe(self, vented: bool) -> None:
         """Let the observer see this tick's command; tell when the camera is lost or back."""

@@ -4,7 +4,7 @@ import math
 
 from logs.schema import pneuarm_pb2 as pb
 
-_LIMITS = ((1, "length, Eq. (4)"), (2, "bend"), (4, "pressure"))
+_LIMITS = ((1, "length, Eq. (4)"), (2, "bend"), (4, "pressure"), (8, "keep-out"))
 
 
 def millimetres(values_m: "list[float] | object") -> str:

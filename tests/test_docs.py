@@ -14,7 +14,17 @@ from logs.schema import pneuarm_pb2 as pb
 from logs.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from service import config
 from service.mode import TABLE, Mode, ModeEvent
-from service.tables import arm, control, festo, hardware, monitors, outputs
+from service.tables import (
+    arm,
+    control,
+    feedback,
+    festo,
+    frames,
+    hardware,
+    monitors,
+    outputs,
+    serial,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -26,12 +36,19 @@ TABLES: dict[str, type[BaseModel]] = {
     "`[arm]`": arm.ArmConfig,
     "`[arm.response]`": arm.ResponseConfig,
     "`[[arm.sections]]`": arm.SectionConfig,
+    "`[[arm.keep_outs]]`": arm.KeepOutConfig,
     "`[control]`": control.ControlConfig,
+    "`[reference]`": feedback.ReferenceConfig,
+    "`[feedback]`": feedback.FeedbackConfig,
+    "`[frames]`": frames.FramesConfig,
     "`[hardware]`": hardware.HardwareConfig,
     "`[monitors]`": monitors.MonitorsConfig,
     "`[simulator]`": hardware.SimulatorConfig,
     "`[festo_cpx]`": festo.FestoCpxConfig,
     "`[festo_vtem]`": festo.FestoVtemConfig,
+    "`[ctrl_p]`": serial.CtrlPConfig,
+    "`[esp32]`": serial.Esp32Config,
+    "`[replay]`": serial.ReplayConfig,
     "`[zenoh]`": outputs.ZenohConfig,
     "`[rerun]`": outputs.RerunConfig,
     "`[log]`": outputs.LogConfig,

@@ -65,6 +65,7 @@ class SymbolicArm:
     n_sections: int
     mass_kg: float
     gravity_m_s2: tuple[float, float, float]
+    tool_m: tuple[float, float, float]
 
 
 def values_of(arm: Arm, index: int, theta: Any) -> dict[str, Any]:
@@ -114,7 +115,7 @@ def symbolic_arm(arm: Arm, theta: ca.SX) -> SymbolicArm:
         for basis, amount in zip(COUPLINGS, row[6:], strict=True):
             coupling = coupling + amount * ca.DM(basis)
         sections.append(SymbolicSection(**values_of(arm, index, row), coupling=coupling))
-    return SymbolicArm(sections, arm.n_sections, arm.mass_kg, arm.gravity_m_s2)
+    return SymbolicArm(sections, arm.n_sections, arm.mass_kg, arm.gravity_m_s2, arm.tool_m)
 
 
 def arm_of(arm: Arm, theta: Array) -> Arm:

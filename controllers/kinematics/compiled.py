@@ -89,15 +89,21 @@ def _over_lengths(jacobian: ca.SX, section: Any) -> ca.SX:
     return columns
 
 
-def symbolic_tip(arm: Any, lengths: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def symbolic_tip(
+    arm: Any, lengths: ca.SX, shares: list[ca.SX] | None = None
+) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Position, rotation and Jacobian (6, n_chambers) of the tip, ``lengths`` in C order.
 
     Walking from the tip to the base: a section turns what follows it and moves it by its lever.
+    With ``shares`` only this part of every section (0 to 1) counts: a place on the backbone.
     """
-    position, rotation, columns = ca.SX(ca.DM(arm.tool_m)), ca.SX.eye(3), ca.SX(6, 0)
+    tool = ca.SX(ca.DM(arm.tool_m)) if shares is None else ca.SX(3, 1)
+    position, rotation, columns = tool, ca.SX.eye(3), ca.SX(6, 0)
     for index in reversed(range(arm.n_sections)):
+        share = 1.0 if shares is None else shares[index]
         shape = symbolic_shape(lengths[3 * index : 3 * index + 3], arm.sections[index])
-        step, turn, local = _section_with_jacobian(*shape)
+        step, turn, local = _section_with_jacobian(*(share * part for part in shape))
+        local = share * local
         lever = turn @ position
         linear = local[:3, :] - ca.skew(lever) @ local[3:, :]
         here = _over_lengths(ca.vertcat(linear, local[3:, :]), arm.sections[index])

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from controllers.actuation import length_bounds_m, pressure_length_bounds_m
 from controllers.arm import LENGTH_MARGIN_M, Arm, Array
-from controllers.controller import Binding
 from controllers.errors import InvalidInput
 from controllers.kinematics.constant_curvature import shapes_from_lengths
+from controllers.reach import Binding
 
 Flags = NDArray[np.bool_]
 

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.arm import Arm, Array
-from controllers.controller import Binding
+from controllers.errors import InvalidInput
 from controllers.kinematics.constant_curvature import lengths_from_shapes, section_inverse
 from controllers.kinematics.reachability import LimitNames, Reachability, checked_positions
 from controllers.kinematics.workspace_nearest import BoundarySearch
 from controllers.kinematics.workspace_region import ROUNDING_M, SectionRegion
 from controllers.kinematics.workspace_search import SearchedRegion
-from controllers.law import AT_BOUND_M
+from controllers.law import AT_BOUND_M, Limits
+from controllers.reach import Binding
 
 
 class Region(Protocol):
@@ -89,3 +90,13 @@ class Workspace:
     def contains(self, positions_m: object) -> NDArray[np.bool_]:
         """Say for positions ``(..., 3)`` whether the tip can be there; raises InvalidInput."""
         return self.region.contains(checked_positions(positions_m, single=False))
+
+    def lengths_m(self, position_m: Array) -> Array:
+        """Lengths (1, 3) of one section whose tip is at a reachable position (3,), within limits.
+
+        Raises InvalidInput for an arm of several sections: there a position has many.
+        """
+        if not isinstance(self.region, SolvedRegion):
+            raise InvalidInput(f"arm {self.arm.name!r} has {self.arm.n_sections} sections, not 1")
+        exact = lengths_from_shapes(section_inverse(position_m), self.region.region.offset_m)
+        return Limits(self.arm).clip(exact[None])

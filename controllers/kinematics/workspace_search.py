@@ -8,6 +8,7 @@ carries its proof, lengths within all limits; an "out of reach" is what no start
 
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,6 @@ from scipy.spatial import cKDTree
 
 from controllers.actuation import length_bounds_m
 from controllers.arm import Arm, Array
-from controllers.controller import Binding
 from controllers.kinematics.compiled import CompiledKinematics
 from controllers.kinematics.constant_curvature import (
     lengths_from_shapes,
@@ -25,8 +25,9 @@ from controllers.kinematics.constant_curvature import (
 from controllers.kinematics.reachability import LimitNames, Reachability
 from controllers.kinematics.workspace_region import folded, unfolded
 from controllers.kinematics.workspace_support import Support, wedge_directions
-from controllers.law import AT_BOUND_M, Limits
-from controllers.qp_ik import QpIk
+from controllers.law import AT_BOUND_M
+from controllers.motion import Motion
+from controllers.reach import Binding
 from controllers.tasks.tip_position import TipPosition
 
 #: A search that ends this close (m) to its target has reached it.
@@ -35,6 +36,11 @@ SEARCH_TOLERANCE_M = 1e-5
 _LIBRARY = 40_000
 _STARTS = 4
 _STEP_M = 0.05  # largest change of a chamber in one step
+_QUICK: dict[str, Any] = {
+    "length_rate_max_m_s": _STEP_M,
+    "length_acceleration_max_m_s2": 1e3,
+    "pressure_slew_max_pa_s": 1e9,
+}
 _STEPS = 80
 _DIRECTIONS, _OUTER_STARTS = 1500, 2
 _RESTS_M = 2e-6  # a tip that moves less in one step is at rest
@@ -67,8 +73,8 @@ class SearchedRegion:
         self._tree = cKDTree(self.tips_m)
         self._kinematics = CompiledKinematics(arm)
         # In a search the only rate limit is the length of its steps.
-        quick = tuple(replace(section, length_rate_max_m_s=_STEP_M) for section in arm.sections)
-        self._law = QpIk(arm, Limits(replace(arm, sections=quick)))
+        quick = tuple(replace(section, **_QUICK) for section in arm.sections)
+        self._motion = Motion(replace(arm, sections=quick))
 
     def contains(self, positions_m: Array) -> NDArray[np.bool_]:
         """Membership of positions ``(..., 3)``, one search each."""
@@ -122,17 +128,17 @@ class SearchedRegion:
 
     def _walk(self, position_m: Array, lengths_m: Array) -> tuple[Array, float]:
         """Follow the QP law to the target; return the best lengths on the way and the distance."""
-        task = TipPosition(position_m, gain_per_s=1.0, speed_max_m_s=2.0 * _STEP_M)
-        tip = self._kinematics.evaluate(lengths_m)
-        best, least = lengths_m, task.error_m(tip, lengths_m)
+        motion = self._motion
+        motion.place(lengths_m)
+        motion.ask(TipPosition(position_m, posture_weight=0.0), 1.0, 2.0 * _STEP_M)
+        motion.place_tip()
+        best, least = lengths_m, motion.error_m
         for _ in range(_STEPS):
-            before = tip.position_m.copy()
-            lengths_m = self._law.step(task, tip, lengths_m, 1.0).lengths_m
-            tip = self._kinematics.evaluate(lengths_m)
-            error = task.error_m(tip, lengths_m)
-            if error < least:
-                best, least = lengths_m, error
-            moved = float(np.abs(tip.position_m - before).max())
+            before = motion.tip.position_m.copy()
+            motion.step(motion.qp_ik, 1.0)
+            if motion.error_m < least:
+                best, least = motion.lengths_m, motion.error_m
+            moved = float(np.abs(motion.tip.position_m - before).max())
             if least <= self.tolerance_m or moved < _RESTS_M:
                 break
         return best, least

@@ -1,5 +1,6 @@
 """Chamber lengths inside Eq. (4) and inside what the pressure range can reach."""
 
+import casadi as ca
 import numpy as np
 
 from controllers.actuation import length_bounds_m
@@ -9,17 +10,15 @@ from controllers.arm import Arm, Array
 class LengthLimit:
     """Keeps every length strictly inside the open interval of Eq. (4)."""
 
+    margin_m = 1e-7
+
     def __init__(self, arm: Arm) -> None:
         self.lower_m, self.upper_m = length_bounds_m(arm)
-        self.pattern: Array = np.eye(arm.n_chambers)
 
-    def rows(self, lengths_m: Array, dt_s: float) -> tuple[Array, Array, Array]:
-        """Identity rows: the step may go as far as the bound."""
-        return (
-            self.pattern,
-            (self.lower_m - lengths_m).reshape(-1),
-            (self.upper_m - lengths_m).reshape(-1),
-        )
+    def slack(self, lengths: ca.SX) -> ca.SX:
+        """Distances to the lower bounds, then to the upper ones."""
+        low, high = ca.DM(self.lower_m.reshape(-1)), ca.DM(self.upper_m.reshape(-1))
+        return ca.vertcat(lengths - low, high - lengths)
 
     def clip(self, lengths_m: Array) -> Array:
         """Nearest lengths that respect the bounds."""

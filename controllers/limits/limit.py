@@ -1,18 +1,20 @@
-"""What every limit gives to the QP."""
+"""What every limit gives to the compiled step."""
 
 from typing import Protocol
 
-from controllers.arm import Array
+import casadi as ca
 
 
 class Limit(Protocol):
-    """Rows of ``lower <= G dq <= upper`` on the step of the lengths dq, both sides in metres.
+    """What no commanded lengths may exceed, as what is left of it.
 
-    ``pattern`` (rows, n_chambers) is True where G may be non-zero; it never changes.
+    The rows of the QP are its linearisation, and the exact check after the QP is its sign: both
+    come from the one expression, so that they cannot differ. ``margin_m`` is what the QP leaves:
+    along a curved bound a straight step needs room, and OSQP has a tolerance.
     """
 
-    pattern: Array
+    margin_m: float
 
-    def rows(self, lengths_m: Array, dt_s: float) -> tuple[Array, Array, Array]:
-        """Return G (rows, n_chambers), lower and upper (rows,) at the given lengths."""
+    def slack(self, lengths: ca.SX) -> ca.SX:
+        """Return what is left (k,), in metres, at ``lengths`` (n_chambers,); below 0: exceeded."""
         ...

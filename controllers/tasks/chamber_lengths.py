@@ -1,25 +1,33 @@
-"""The chambers at given lengths."""
+"""The chambers at given lengths, and the posture."""
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from controllers.arm import Array
-from controllers.kinematics.compiled import TipState
+from controllers.tasks.wanted import Wanted
 
 
 @dataclass(frozen=True)
 class ChamberLengths:
-    """Bring the chambers to ``lengths_m`` (n_sections, 3); the law limits the rate."""
+    """Bring the chambers to ``lengths_m`` (n_sections, 3); the limits say how fast."""
 
     lengths_m: Array
-    gain_per_s: float
+    weight: float = 1.0
 
-    def rate_and_jacobian(self, tip: TipState, lengths_m: Array) -> tuple[Array, Array]:
+    def write(self, wanted: Wanted) -> None:
         """One row a chamber, the identity as the Jacobian."""
-        rate = self.gain_per_s * (self.lengths_m - lengths_m).reshape(-1)
-        return rate, np.eye(rate.size)
+        wanted["lengths_m"], wanted["lengths_weight"] = self.lengths_m, self.weight
 
-    def error_m(self, tip: TipState, lengths_m: Array) -> float:
-        """Largest distance of a chamber from its length."""
-        return float(np.abs(self.lengths_m - lengths_m).max())
+
+@dataclass(frozen=True)
+class Posture:
+    """Stay near the middle of the bounds, with the freedoms that the other tasks leave.
+
+    It works in the null space of the others, so it costs them nothing; ``weight`` is a speed: with
+    1 a chamber at its bound goes back at a quarter of its largest rate.
+    """
+
+    weight: float = 1.0
+
+    def write(self, wanted: Wanted) -> None:
+        """No row of its own."""
+        wanted["posture_weight"] = self.weight

@@ -1,26 +1,32 @@
-"""What every task gives to a law, and the helpers the tasks share."""
+"""What every task gives to a law: its part of the vector of what is wanted."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
-from controllers.arm import Array
-from controllers.kinematics.compiled import TipState
+from controllers.tasks.wanted import Wanted
 
 
 class Task(Protocol):
-    """A wanted rate of some quantity and that quantity's Jacobian over the chamber lengths."""
+    """Something wanted of the arm. A weight counts beside the other tasks' weights."""
 
-    def rate_and_jacobian(self, tip: TipState, lengths_m: Array) -> tuple[Array, Array]:
-        """Return the wanted rate (m,) in m/s and the Jacobian (m, n_chambers)."""
-        ...
-
-    def error_m(self, tip: TipState, lengths_m: Array) -> float:
-        """Return how far (m) the task is from done; 0 for a task that has no end."""
+    def write(self, wanted: Wanted) -> None:
+        """Write down what is wanted; other parts are left alone."""
         ...
 
 
-def limited(vector: Array, largest: float) -> Array:
-    """Scale a vector down to the norm ``largest``, keeping its direction."""
-    norm = float(np.sqrt(vector @ vector))
-    return vector if norm <= largest else vector * (largest / norm)
+@dataclass(frozen=True)
+class Combined:
+    """Several tasks at once; where they contradict, the weighted compromise of least squares."""
+
+    tasks: tuple[Task, ...]
+
+    def write(self, wanted: Wanted) -> None:
+        """Write down what each of them wants."""
+        for task in self.tasks:
+            task.write(wanted)
+
+
+def fill(wanted: Wanted, task: Task, gain_per_s: float, speed_max_m_s: float) -> None:
+    """Ask for one task and nothing else, with errors worked off at a gain and up to a speed."""
+    wanted.forget(gain_per_s, speed_max_m_s)
+    task.write(wanted)

@@ -6,32 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.arm import Array
-from controllers.kinematics.compiled import TipState
-from controllers.tasks.task import limited
-
-#: One radian of orientation error weighs as much as this many metres of position error.
-ORIENTATION_LENGTH_M = 0.05
-
-
-def rotation_vector(rotation: Array) -> Array:
-    """Axis times angle (3,), rad, of a rotation matrix (3, 3); angles up to pi."""
-    axial = 0.5 * np.array(
-        [
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        ]
-    )
-    sine = float(np.sqrt(axial @ axial))
-    cosine = 0.5 * (float(np.trace(rotation)) - 1.0)
-    if sine > 1e-9:
-        return axial * (math.atan2(sine, cosine) / sine)
-    if cosine > 0.0:
-        return axial
-    # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
-    column = np.argmax(np.diag(rotation))
-    axis: Array = rotation[:, column] + np.eye(3)[column]
-    return axis * (math.pi / float(np.linalg.norm(axis)))
+from controllers.tasks.wanted import Wanted
 
 
 def rotation_from_quaternion(quaternion_xyzw: Array) -> Array:
@@ -67,24 +42,17 @@ class TipPose:
     """Bring the tip to a pose in the base frame: position (3,) and rotation (3, 3).
 
     An arm of one section has three degrees of freedom: where both cannot be had the result is
-    the weighted compromise of the least squares.
+    the weighted compromise of the least squares; a radian weighs as much as ORIENTATION_LENGTH_M.
     """
 
     position_m: Array
     rotation: Array
-    gain_per_s: float
-    speed_max_m_s: float
+    position_weight: float = 1.0
+    orientation_weight: float = 1.0
 
-    def _errors(self, tip: TipState) -> tuple[Array, Array]:
-        turn = rotation_vector(self.rotation @ tip.rotation.T)
-        return self.position_m - tip.position_m, ORIENTATION_LENGTH_M * turn
-
-    def rate_and_jacobian(self, tip: TipState, lengths_m: Array) -> tuple[Array, Array]:
-        """Six rows: position, then orientation scaled by ORIENTATION_LENGTH_M."""
-        rate = limited(self.gain_per_s * np.concatenate(self._errors(tip)), self.speed_max_m_s)
-        jacobian = np.vstack([tip.jacobian[:3], ORIENTATION_LENGTH_M * tip.jacobian[3:]])
-        return rate, jacobian
-
-    def error_m(self, tip: TipState, lengths_m: Array) -> float:
-        """Norm of the position error and the scaled orientation error together."""
-        return float(np.linalg.norm(np.concatenate(self._errors(tip))))
+    def write(self, wanted: Wanted) -> None:
+        """Six rows."""
+        wanted["position_m"], wanted["position_weight"] = self.position_m, self.position_weight
+        wanted["rotation"], wanted["orientation_weight"] = self.rotation, self.orientation_weight
+        wanted["position_follows"] = wanted["rotation_follows"] = 1.0
+        wanted["posture_weight"] = 1.0

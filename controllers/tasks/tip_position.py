@@ -2,33 +2,26 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from controllers.arm import Array
-from controllers.kinematics.compiled import TipState
-from controllers.tasks.task import limited
+from controllers.tasks.wanted import Wanted
 
 
 @dataclass(frozen=True)
 class TipPosition:
     """Bring the tip to ``position_m`` (3,) in the base frame, by proportional feedback.
 
-    ``velocity_m_s`` (3,) is that of the position itself, added to the feedback.
+    ``velocity_m_s`` (3,) is how the position itself moves: it is added to the feedback, so that a
+    moving position is followed without lag. What the position leaves free goes to the posture.
     """
 
     position_m: Array
-    gain_per_s: float
-    speed_max_m_s: float
     velocity_m_s: Array | None = None
+    weight: float = 1.0
+    posture_weight: float = 1.0
 
-    def rate_and_jacobian(self, tip: TipState, lengths_m: Array) -> tuple[Array, Array]:
-        """Velocity toward the position, at most ``speed_max_m_s``, and the linear Jacobian."""
-        velocity = self.gain_per_s * (self.position_m - tip.position_m)
-        if self.velocity_m_s is not None:
-            velocity += self.velocity_m_s
-        return limited(velocity, self.speed_max_m_s), tip.jacobian[:3]
-
-    def error_m(self, tip: TipState, lengths_m: Array) -> float:
-        """Distance from the tip to the position."""
-        offset = self.position_m - tip.position_m
-        return float(np.sqrt(offset @ offset))
+    def write(self, wanted: Wanted) -> None:
+        """Three rows."""
+        wanted["position_m"] = self.position_m
+        wanted["velocity_m_s"] = 0.0 if self.velocity_m_s is None else self.velocity_m_s
+        wanted["position_weight"], wanted["position_follows"] = self.weight, 1.0
+        wanted["posture_weight"] = self.posture_weight

@@ -2,11 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from controllers.arm import Array
-from controllers.kinematics.compiled import TipState
-from controllers.tasks.tip_pose import ORIENTATION_LENGTH_M
+from controllers.tasks.wanted import Wanted
 
 
 @dataclass(frozen=True)
@@ -15,7 +12,8 @@ class TipTwist:
 
     ``linear_m_s`` (3,) is the velocity of the body's point that lies at the reference point: the
     tip itself, or the origin of the base (a spatial twist). Both vectors are expressed in the
-    frame, base or tip. Without ``angular_rad_s`` only the linear part is asked for.
+    frame, base or tip. Without ``angular_rad_s`` only the linear part is asked for. An arm of one
+    section has three degrees of freedom: all of them go to the linear part.
     """
 
     linear_m_s: Array
@@ -23,18 +21,12 @@ class TipTwist:
     in_tip_frame: bool
     about_base_origin: bool
 
-    def rate_and_jacobian(self, tip: TipState, lengths_m: Array) -> tuple[Array, Array]:
-        """Linear rows, and angular rows scaled to metres when an angular part was given."""
-        turn = tip.rotation if self.in_tip_frame else np.eye(3)
-        linear = turn @ self.linear_m_s
-        if self.angular_rad_s is None:
-            return linear, tip.jacobian[:3]
-        angular = turn @ self.angular_rad_s
-        if self.about_base_origin:
-            linear = linear + np.cross(angular, tip.position_m)
-        rate = np.concatenate([linear, ORIENTATION_LENGTH_M * angular])
-        return rate, np.vstack([tip.jacobian[:3], ORIENTATION_LENGTH_M * tip.jacobian[3:]])
-
-    def error_m(self, tip: TipState, lengths_m: Array) -> float:
-        """Return 0: a twist has no end."""
-        return 0.0
+    def write(self, wanted: Wanted) -> None:
+        """Three rows, and three more where an angular part was given and can be had."""
+        wanted["velocity_m_s"], wanted["position_weight"] = self.linear_m_s, 1.0
+        wanted["in_tip_frame"] = self.in_tip_frame
+        wanted["posture_weight"] = 1.0
+        if self.angular_rad_s is not None:
+            wanted["angular_rad_s"] = self.angular_rad_s
+            wanted["about_base_origin"] = self.about_base_origin
+            wanted["orientation_weight"] = float(wanted["lengths_m"].size > 3)

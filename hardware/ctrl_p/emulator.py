@@ -10,6 +10,7 @@ import numpy as np
 from hardware.channels import Channels
 from hardware.ctrl_p.protocol import KPA, Mode
 from hardware.emulation import EmulatedArm
+from hardware.pseudo_terminal import SlowMotion
 
 _UNITS_KPA = {0: ("psi", 6.89475729), 1: ("kPa", 1.0), 2: ("bar", 100.0), 3: ("atm", 101.325)}
 
@@ -21,7 +22,7 @@ class CtrlPEmulator:
     """
 
     def __init__(self, arm: EmulatedArm, channels: Channels, knows_units: bool = True) -> None:
-        self.arm = arm
+        self.arm, self._motion = arm, SlowMotion()
         self._channels, self._knows_units = channels, knows_units
         self.boot()
 
@@ -42,7 +43,7 @@ class CtrlPEmulator:
 
     def advance(self, time_s: float) -> bytes:
         """Let the air move on; return the telemetry that is due."""
-        self.arm.advance(time_s)
+        self.arm.advance(self._motion.until(time_s))
         if Mode.VALVE not in self._modes and self._is_too_high():
             self._modes, self._valve = [int(Mode.VALVE)] * self._channels.count, -1.0
             self._apply(time_s, "over-pressure")

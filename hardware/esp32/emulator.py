@@ -14,6 +14,7 @@ from controllers.arm import Array
 from hardware.channels import Channels
 from hardware.emulation import EmulatedArm
 from hardware.esp32.protocol import CEILING_PA, CHAMBERS, KPA, PASS_S
+from hardware.pseudo_terminal import SlowMotion
 
 #: What the control of lengths raises the targets by in a pass, towards its first target, kPa.
 _LENGTH_CONTROL_KPA = 0.02
@@ -23,7 +24,7 @@ class Esp32Emulator:
     """The controller's side of the port: bytes in, bytes out, at times that are given."""
 
     def __init__(self, arm: EmulatedArm, channels: Channels) -> None:
-        self.arm = arm
+        self.arm, self._motion = arm, SlowMotion()
         self._channels = channels
         self.boot()
 
@@ -41,7 +42,7 @@ class Esp32Emulator:
 
     def advance(self, time_s: float) -> bytes:
         """Let the air move on; once a pass, carry out one command and say how things are."""
-        self.arm.advance(time_s)
+        self.arm.advance(self._motion.until(time_s))
         if time_s - self._pass_s < PASS_S:
             return b""
         self._pass_s = time_s

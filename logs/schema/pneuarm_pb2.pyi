@@ -31,6 +31,9 @@ class TargetKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     TWIST: _ClassVar[TargetKind]
     LENGTHS: _ClassVar[TargetKind]
     PRESSURES: _ClassVar[TargetKind]
+    DIRECTION: _ClassVar[TargetKind]
+    POINT: _ClassVar[TargetKind]
+    TASKS: _ClassVar[TargetKind]
     TRAJECTORY: _ClassVar[TargetKind]
     CIRCLE: _ClassVar[TargetKind]
     LINE: _ClassVar[TargetKind]
@@ -81,6 +84,9 @@ POSE: TargetKind
 TWIST: TargetKind
 LENGTHS: TargetKind
 PRESSURES: TargetKind
+DIRECTION: TargetKind
+POINT: TargetKind
+TASKS: TargetKind
 TRAJECTORY: TargetKind
 CIRCLE: TargetKind
 LINE: TargetKind
@@ -170,6 +176,54 @@ class PressuresTarget(_message.Message):
     pressure_pa: _containers.RepeatedScalarFieldContainer[float]
     def __init__(self, pressure_pa: _Optional[_Iterable[float]] = ...) -> None: ...
 
+class DirectionTarget(_message.Message):
+    __slots__ = ("frame_id", "direction")
+    FRAME_ID_FIELD_NUMBER: _ClassVar[int]
+    DIRECTION_FIELD_NUMBER: _ClassVar[int]
+    frame_id: str
+    direction: Vector3
+    def __init__(self, frame_id: _Optional[str] = ..., direction: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
+
+class PointTarget(_message.Message):
+    __slots__ = ("frame_id", "position_m", "station")
+    FRAME_ID_FIELD_NUMBER: _ClassVar[int]
+    POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    STATION_FIELD_NUMBER: _ClassVar[int]
+    frame_id: str
+    position_m: Vector3
+    station: float
+    def __init__(self, frame_id: _Optional[str] = ..., position_m: _Optional[_Union[Vector3, _Mapping]] = ..., station: _Optional[float] = ...) -> None: ...
+
+class PostureTarget(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
+class WeightedTask(_message.Message):
+    __slots__ = ("weight", "orientation_weight", "position", "pose", "direction", "point", "lengths", "posture")
+    WEIGHT_FIELD_NUMBER: _ClassVar[int]
+    ORIENTATION_WEIGHT_FIELD_NUMBER: _ClassVar[int]
+    POSITION_FIELD_NUMBER: _ClassVar[int]
+    POSE_FIELD_NUMBER: _ClassVar[int]
+    DIRECTION_FIELD_NUMBER: _ClassVar[int]
+    POINT_FIELD_NUMBER: _ClassVar[int]
+    LENGTHS_FIELD_NUMBER: _ClassVar[int]
+    POSTURE_FIELD_NUMBER: _ClassVar[int]
+    weight: float
+    orientation_weight: float
+    position: PositionTarget
+    pose: PoseTarget
+    direction: DirectionTarget
+    point: PointTarget
+    lengths: LengthsTarget
+    posture: PostureTarget
+    def __init__(self, weight: _Optional[float] = ..., orientation_weight: _Optional[float] = ..., position: _Optional[_Union[PositionTarget, _Mapping]] = ..., pose: _Optional[_Union[PoseTarget, _Mapping]] = ..., direction: _Optional[_Union[DirectionTarget, _Mapping]] = ..., point: _Optional[_Union[PointTarget, _Mapping]] = ..., lengths: _Optional[_Union[LengthsTarget, _Mapping]] = ..., posture: _Optional[_Union[PostureTarget, _Mapping]] = ...) -> None: ...
+
+class TasksTarget(_message.Message):
+    __slots__ = ("tasks",)
+    TASKS_FIELD_NUMBER: _ClassVar[int]
+    tasks: _containers.RepeatedCompositeFieldContainer[WeightedTask]
+    def __init__(self, tasks: _Optional[_Iterable[_Union[WeightedTask, _Mapping]]] = ...) -> None: ...
+
 class Waypoint(_message.Message):
     __slots__ = ("time_s", "position_m")
     TIME_S_FIELD_NUMBER: _ClassVar[int]
@@ -223,7 +277,7 @@ class LineTarget(_message.Message):
     def __init__(self, frame_id: _Optional[str] = ..., id: _Optional[int] = ..., start_m: _Optional[_Union[Vector3, _Mapping]] = ..., end_m: _Optional[_Union[Vector3, _Mapping]] = ..., period_s: _Optional[float] = ..., repeats: _Optional[float] = ...) -> None: ...
 
 class Target(_message.Message):
-    __slots__ = ("client_id", "lease_secret", "sequence", "state_sequence", "law", "position", "pose", "twist", "lengths", "pressures", "trajectory", "circle", "line")
+    __slots__ = ("client_id", "lease_secret", "sequence", "state_sequence", "law", "position", "pose", "twist", "lengths", "pressures", "direction", "point", "tasks", "trajectory", "circle", "line")
     CLIENT_ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_SECRET_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -234,6 +288,9 @@ class Target(_message.Message):
     TWIST_FIELD_NUMBER: _ClassVar[int]
     LENGTHS_FIELD_NUMBER: _ClassVar[int]
     PRESSURES_FIELD_NUMBER: _ClassVar[int]
+    DIRECTION_FIELD_NUMBER: _ClassVar[int]
+    POINT_FIELD_NUMBER: _ClassVar[int]
+    TASKS_FIELD_NUMBER: _ClassVar[int]
     TRAJECTORY_FIELD_NUMBER: _ClassVar[int]
     CIRCLE_FIELD_NUMBER: _ClassVar[int]
     LINE_FIELD_NUMBER: _ClassVar[int]
@@ -247,10 +304,13 @@ class Target(_message.Message):
     twist: TwistTarget
     lengths: LengthsTarget
     pressures: PressuresTarget
+    direction: DirectionTarget
+    point: PointTarget
+    tasks: TasksTarget
     trajectory: TrajectoryTarget
     circle: CircleTarget
     line: LineTarget
-    def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., sequence: _Optional[int] = ..., state_sequence: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., position: _Optional[_Union[PositionTarget, _Mapping]] = ..., pose: _Optional[_Union[PoseTarget, _Mapping]] = ..., twist: _Optional[_Union[TwistTarget, _Mapping]] = ..., lengths: _Optional[_Union[LengthsTarget, _Mapping]] = ..., pressures: _Optional[_Union[PressuresTarget, _Mapping]] = ..., trajectory: _Optional[_Union[TrajectoryTarget, _Mapping]] = ..., circle: _Optional[_Union[CircleTarget, _Mapping]] = ..., line: _Optional[_Union[LineTarget, _Mapping]] = ...) -> None: ...
+    def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., sequence: _Optional[int] = ..., state_sequence: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., position: _Optional[_Union[PositionTarget, _Mapping]] = ..., pose: _Optional[_Union[PoseTarget, _Mapping]] = ..., twist: _Optional[_Union[TwistTarget, _Mapping]] = ..., lengths: _Optional[_Union[LengthsTarget, _Mapping]] = ..., pressures: _Optional[_Union[PressuresTarget, _Mapping]] = ..., direction: _Optional[_Union[DirectionTarget, _Mapping]] = ..., point: _Optional[_Union[PointTarget, _Mapping]] = ..., tasks: _Optional[_Union[TasksTarget, _Mapping]] = ..., trajectory: _Optional[_Union[TrajectoryTarget, _Mapping]] = ..., circle: _Optional[_Union[CircleTarget, _Mapping]] = ..., line: _Optional[_Union[LineTarget, _Mapping]] = ...) -> None: ...
 
 class ModeRequest(_message.Message):
     __slots__ = ("client_id", "lease_secret", "action", "take_over")

@@ -43,7 +43,6 @@ def record(client: Client, moves: Sequence[Move], n_sections: int, tell: Progres
     Whatever ends it early, Ctrl-C too, leaves the arm holding, then vented. Raises ModeRefused
     when the arm stops following, and CalibrationError when the tip is no longer measured.
     """
-    require_tip(client)
     client.enable()
     try:
         states = _moved(client, moves, n_sections, tell)

@@ -87,7 +87,7 @@ def _errors(figure: Any, calibration: Calibration) -> None:
         told = f"{label}, mean {errors.mean():.1f} mm"
         axes.bar(numbers, errors, color=color, width=0.8, label=told)
     axes.set(xlabel="rest", ylabel="tip error, mm", xlim=(0.0, len(numbers) + 1.0))
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     axes.grid(axis="y", alpha=0.3)
 
 

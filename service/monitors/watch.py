@@ -49,6 +49,11 @@ def of_fresh(arm: Arm, settings: MonitorSettings) -> tuple[Monitor, ...]:
     )
 
 
+def measurement_age_s(measurement: Measurement, now_s: float) -> float:
+    """How old a measurement is; one taken while the tick was already due counts as new."""
+    return 0.0 if measurement.taken_s is None else max(0.0, now_s - measurement.taken_s)
+
+
 class Watch:
     """The monitors, and the prediction they share."""
 
@@ -77,7 +82,7 @@ class Watch:
         measured = measurement.pressures_pa.ravel().tolist()
         # Before its first acknowledgement a device has not been told anything but zero.
         sent = [value if value == value else 0.0 for value in sent_pa.ravel().tolist()]
-        setpoints, taken_s = measurement.setpoints_pa, measurement.taken_s
+        setpoints = measurement.setpoints_pa
         seen = Seen(
             now_s=now_s,
             dt_s=dt_s,
@@ -86,7 +91,7 @@ class Watch:
             measured_pa=measured,
             sent_pa=sent,
             expected_pa=self._lag.advance(sent, measured, dt_s),
-            age_s=0.0 if taken_s is None else now_s - taken_s,
+            age_s=measurement_age_s(measurement, now_s),
             supply_pa=measurement.supply_pa,
             setpoints_pa=None if setpoints is None else setpoints.ravel().tolist(),
             lengths_m=measurement.lengths_m.ravel().tolist(),

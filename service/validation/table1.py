@@ -78,6 +78,7 @@ class IdentifiedArm:
             length_max_m=1.5 * self.rest_length_m,
             bend_max_rad=0.5 * np.pi,
             length_rate_max_m_s=0.2,
+            length_acceleration_max_m_s2=4.0,
             pressure_min_pa=0.0,
             pressure_max_pa=1.2 * BAR,
             pressure_slew_max_pa_s=6.0 * BAR,

@@ -114,19 +114,26 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10, help="arms of the family (default 10)")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    rows = [measure(arguments.preset, seed) for seed in range(arguments.seeds)]
+    rows = []
+    if not arguments.json:
+        print("seed  before mean, max %   after mean, max %   times smaller")
+    for seed in range(arguments.seeds):
+        rows.append(measure(arguments.preset, seed))
+        if not arguments.json:
+            print(_line(rows[-1]), flush=True)
     worst = max(rows, key=lambda row: row["after_percent"]["mean"])
     if arguments.json:
         print(json.dumps({"preset": arguments.preset, "rows": rows, "worst": worst}))
-        return
-    print("seed  before mean, max %   after mean, max %   times smaller")
-    for row in rows:
-        before, after = row["before_percent"], row["after_percent"]
-        print(
-            f"{row['seed']:4} {before['mean']:9.2f} {before['max']:9.2f} {after['mean']:9.2f}"
-            f" {after['max']:9.2f} {row['times_smaller']:12.1f}"
-        )
-    print(f"worst: seed {worst['seed']}, mean {worst['after_percent']['mean']:.2f} %")
+    else:
+        print(f"worst: seed {worst['seed']}, mean {worst['after_percent']['mean']:.2f} %")
+
+
+def _line(row: dict[str, Any]) -> str:
+    before, after = row["before_percent"], row["after_percent"]
+    return (
+        f"{row['seed']:4} {before['mean']:9.2f} {before['max']:9.2f} {after['mean']:9.2f}"
+        f" {after['max']:9.2f} {row['times_smaller']:12.1f}"
+    )
 
 
 if __name__ == "__main__":

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from controllers.actuation import PressureMap
-from controllers.arm import Arm, Array
+from controllers.arm import Arm, Array, KeepOut, Sphere
 from controllers.controller import Controller, Reach
-from controllers.kinematics.constant_curvature import shapes_from_lengths, tip_transform
+from controllers.kinematics.constant_curvature import (
+    section_end_transforms,
+    section_transforms,
+    shapes_from_lengths,
+    tip_transform,
+)
 from controllers.settings import ControlSettings
 from controllers.targets import LawName, PositionTarget, Target
 from tests.arms import ARMS
@@ -44,8 +49,13 @@ def path(arm: Arm, controller: Controller, target: Target, seconds: float) -> It
             return
 
 
-def assert_within_limits(arm: Arm, before: Array, after: Array) -> None:
-    """Eq. (4) strictly, the bend, and the rate since the tick before."""
+def assert_within_limits(
+    arm: Arm, before: Array, after: Array, rates: Array | None = None
+) -> Array:
+    """Check every limit since the tick before; return the rates now (n_sections, 3).
+
+    Eq. (4) strictly, bend, pressure, its slew, keep-outs, rate; acceleration from ``rates`` on.
+    """
     assert np.isfinite(after).all()
     assert (after > arm.per_chamber("length_min_m")).all()
     assert (after < arm.per_chamber("length_max_m")).all()
@@ -54,11 +64,40 @@ def assert_within_limits(arm: Arm, before: Array, after: Array) -> None:
     assert (theta <= arm.per_section("bend_max_rad")[:, 0] + 1e-12).all()
     largest = arm.per_chamber("length_rate_max_m_s") * DT_S
     assert (np.abs(after - before) <= largest * (1.0 + 1e-9)).all()
+    pressures = [PressureMap(arm).pressures_pa(lengths) for lengths in (before, after)]
+    slew = np.abs(pressures[1] - pressures[0]) / DT_S
+    assert (slew <= arm.per_chamber("pressure_slew_max_pa_s") * (1.0 + 1e-9)).all()
+    assert (pressures[1] >= arm.per_chamber("pressure_min_pa") - 1e-6).all()
+    assert (pressures[1] <= arm.per_chamber("pressure_max_pa") + 1e-6).all()
+    for place in arm.keep_outs:
+        assert clearance_m(arm, after, place) >= 0.0
+    now: Array = (after - before) / DT_S
+    if rates is not None:
+        most = arm.per_chamber("length_acceleration_max_m_s2") * DT_S
+        assert (np.abs(now - rates) <= most + 1e-9).all()
+    return now
+
+
+def clearance_m(arm: Arm, lengths: Array, place: KeepOut) -> float:
+    """Distance of the arm's skin from a keep-out, from many points and no chords."""
+    ends = section_end_transforms(arm, lengths)
+    shapes = shapes_from_lengths(lengths, arm.per_section("chamber_offset_m"))
+    points, start = [], np.eye(4)
+    for shape, end in zip(shapes, ends, strict=True):
+        parts = section_transforms(np.linspace(0.0, 1.0, 200)[:, None] * shape)
+        points.append((start @ parts)[:, :3, 3])
+        start = end
+    body = np.concatenate(points)
+    if isinstance(place, Sphere):
+        distances = np.linalg.norm(body - place.center_m, axis=1) - place.radius_m
+    else:
+        distances = place.offset_m - body @ np.array(place.normal)
+    return float(distances.min()) - arm.body_radius_m
 
 
 def run(arm: Arm, controller: Controller, target: Target, seconds: float = 8.0) -> None:
     """Follow a target; no tick may leave a limit."""
-    before = controller.lengths_m.copy()
+    before, rates = controller.lengths_m.copy(), controller._motion.rates_m_s
     for lengths in path(arm, controller, target, seconds):
-        assert_within_limits(arm, before, lengths)
+        rates = assert_within_limits(arm, before, lengths, rates)
         before = lengths

@@ -7,7 +7,8 @@ from controllers.actuation import PressureMap
 from controllers.arm import Arm
 from controllers.estimator import Estimator
 from controllers.kinematics.constant_curvature import tip_transform
-from tests.arms import ARMS, random_lengths
+from tests.arms import ARMS, random_lengths, trunk_arm
+from tests.controllers.test_actuation_loaded import loaded
 
 every_arm = pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
 
@@ -39,3 +40,15 @@ def test_the_tip_is_the_one_of_constant_curvature(arm: Arm) -> None:
     expected = tip_transform(arm, lengths)
     np.testing.assert_allclose(tip.position_m, expected[:3, 3], atol=1e-14)
     np.testing.assert_allclose(tip.rotation, expected[:3, :3], atol=1e-14)
+
+
+def test_the_lengths_of_a_calibrated_arm_are_those_of_its_map_from_tick_to_tick() -> None:
+    arm = loaded(trunk_arm())
+    estimator, pressure_map = Estimator(arm), PressureMap(arm)
+    unknown = np.full((3, 3), np.nan)
+    for share in np.linspace(-0.5, 0.5, 11):
+        pressures = share * arm.per_chamber("pressure_max_pa") * [1.0, -0.5, 0.2]
+        lengths = estimator.lengths_m(pressures, unknown)
+        np.testing.assert_allclose(lengths, pressure_map.lengths_m(pressures), atol=1e-9)
+    assert np.isnan(estimator.lengths_m(unknown, unknown)).all()
+    np.testing.assert_allclose(estimator.lengths_m(pressures, unknown), lengths, atol=1e-9)

@@ -29,6 +29,8 @@ from hardware.simulator.adapter import SimulatedArm
 from hardware.simulator.parameters import SimulatorParameters
 from logs.replay_device import ReplayDevice
 from service.config import load
+from tests.hardware.example_adapter import ValveBox
+from tests.hardware.example_device import ValveBoxDevice
 from tests.logs.test_replay_device import record
 
 #: With vacuum, and without.
@@ -162,6 +164,22 @@ def replay(arm: Arm) -> Iterator[Bench]:
         yield Bench(arm, ReplayDevice(arm, record(Path(folder) / "log.mcap", arm, 6000)))
 
 
+@contextmanager
+def example(arm: Arm) -> Iterator[Bench]:
+    """The adapter of docs/hardware.md, to copy from; 1 mbar a step, a watchdog of 200 ms."""
+    with ValveBoxDevice(EmulatedArm(arm, 0)) as device:
+        yield Bench(
+            arm,
+            ValveBox(arm, "127.0.0.1", device.port),
+            device.told_pa,
+            resolution_pa=100.0,
+            unplug=device.unplug,
+            plug=device.plug,
+            abandon=lambda: None,
+            clock=RealClock(),
+        )
+
+
 def serial_bench(
     arm: Arm,
     hardware: Hardware,
@@ -194,6 +212,7 @@ DEVICES: dict[str, Factory] = {
     "ctrl-p": ctrl_p,
     "esp32": esp32,
     "replay": replay,
+    "example": example,
 }
 
 #: How far ``told_pa`` may be from what was sent, in Pa: the simulator has real valves.

@@ -19,8 +19,9 @@ from hardware.terminal_watchdog import TerminalWatchdog
 from hardware.transport_faults import TransportFaults
 from tests.hardware.contract import Bench, Factory, RealClock
 
-WATCHDOG = TerminalWatchdog(46100, 1, 200)
-TIMEOUT_S = 0.1
+#: Longer than in a laboratory: a test machine may be busier than any robot's.
+WATCHDOG = TerminalWatchdog(46100, 1, 400)
+TIMEOUT_S = 0.5
 
 
 class Served:
@@ -122,6 +123,7 @@ def _bench(
         unplug=unplug,
         plug=plug,
         abandon=hardware._terminal.close,
+        watchdog_s=0.8,
         clock=RealClock(),
     )
 

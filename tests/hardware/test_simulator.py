@@ -18,6 +18,7 @@ SECTION = Section(
     length_max_m=0.3,
     bend_max_rad=2.618,
     length_rate_max_m_s=0.2,
+    length_acceleration_max_m_s2=4.0,
     pressure_min_pa=-9e4,
     pressure_max_pa=9e4,
     pressure_slew_max_pa_s=4e5,

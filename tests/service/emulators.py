@@ -35,7 +35,9 @@ class Emulator:
         # A test machine may be busier than any robot's.
         self.tables["hardware"] |= {"exchange_rate_hz": 100.0}
         self.tables["control"] = {"rate_hz": 250.0}
-        self.tables[name.replace("-", "_")] |= {"timeout_ms": 150.0, "watchdog_ms": 500}
+        serial = name in ("ctrl-p", "esp32")
+        patient = {"timeout_ms": 3000.0} if serial else {"timeout_ms": 150.0, "watchdog_ms": 500}
+        self.tables[name.replace("-", "_")] |= patient
 
     def say(self, words: str) -> None:
         """Inject a fault; returns once it is there."""

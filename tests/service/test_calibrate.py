@@ -68,10 +68,10 @@ def pose_of(state: pb.ArmState, noise_m: np.ndarray) -> PoseInFrame:
 
 
 def few_moves(arm: Arm) -> list[Move]:
-    """Return what is just enough for a fit: twelve rests, with steps between them."""
-    shares = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (0, 1, 1)]
-    shares += [(1, 0, 1), (1, 1, 0), (0.5, 0.5, 0.5), (-0.5, -0.5, -0.5), (0.4, 0, 0), (0, 0, 0)]
-    return [Move(0.45e5 * np.array([share], dtype=float), 0.1, 1.0) for share in shares]
+    """Return what is just enough for a fit: a dozen rests, each a short way from the one before."""
+    shares = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (-1, 0, 0), (-1, -1, 0)]
+    shares += [(0, -1, 0), (0, -1, -1), (0, 0, -1), (1, 1, 0), (1, 1, 1), (0, 0, 0)]
+    return [Move(0.25e5 * np.array([share], dtype=float), 0.1, 1.15) for share in shares]
 
 
 @pytest.fixture(scope="module")

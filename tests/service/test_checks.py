@@ -8,18 +8,27 @@ from hypothesis import strategies as st
 
 from controllers.errors import TargetRejected
 from controllers.targets import (
+    DirectionTarget,
     LawName,
     LengthsTarget,
+    PointTarget,
     PoseTarget,
     PositionTarget,
     PressuresTarget,
+    TasksTarget,
     TwistTarget,
 )
 from logs.codec import JSON, decode
 from logs.schema import pneuarm_pb2 as pb
 from service.checks import TargetChecker
 from service.config import load
-from service.target_messages import pose_target, position_target, twist_target
+from service.target_messages import (
+    direction_target,
+    point_target,
+    pose_target,
+    position_target,
+    twist_target,
+)
 
 PAPER = TargetChecker(load(preset="paper").build_arm())
 TRUNK = TargetChecker(load(preset="trunk").build_arm())
@@ -206,3 +215,70 @@ def test_a_measured_pose_is_checked_like_a_target() -> None:
     message.frame_id, message.pose.orientation.w = "base", 0.5
     with pytest.raises(TargetRejected, match=r"norm 0\.5"):
         PAPER.tip_pose(message)
+
+
+def weighted(kind: str, weight: float, **fields: object) -> pb.WeightedTask:
+    """One of several tasks, from the target of the same kind."""
+    made = {
+        "position": position_target((0.0, 0.0, 0.2)),
+        "pose": pose_target((0.0, 0.0, 0.2), UPRIGHT),
+        "direction": direction_target((0.0, 0.0, 2.0)),
+        "point": point_target((0.0, 0.0, 0.1), 0.5),
+        "lengths": lengths(0.2, 0.2, 0.2),
+    }
+    task = pb.WeightedTask(weight=weight, **fields)  # type: ignore[arg-type]
+    if kind == "posture":
+        task.posture.SetInParent()
+    elif kind:
+        getattr(task, kind).CopyFrom(getattr(made[kind], kind))
+    return task
+
+
+def together(*tasks: pb.WeightedTask) -> pb.Target:
+    return pb.Target(tasks=pb.TasksTarget(tasks=tasks))
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        (direction_target((0.0, 0.0, 0.0)), "direction = [0, 0, 0] points nowhere"),
+        (direction_target((0.0, NAN, 0.0)), "must be finite"),
+        (point_target((0.0, 0.0, 0.2), 0.5), "reaches at most 0.15 m"),
+        (point_target((0.0, 0.0, 0.2), 2.0), "station = 2; allowed: above 0"),
+        (point_target((0.0, 0.0, 0.2), NAN), "station = nan"),
+        (together(), "at least one is needed"),
+        (together(weighted("posture", 1.0)), "no task besides posture"),
+        (together(weighted("position", 0.0)), "weight of task position is 0; allowed: above 0"),
+        (together(weighted("position", -1.0)), "weight of task position is -1"),
+        (together(weighted("position", NAN)), "weight of task position is nan"),
+        (together(weighted("pose", 1.0, orientation_weight=-2.0)), "orientation_weight of task"),
+        (together(weighted("position", 1.0), weighted("pose", 1.0)), "position and pose, which"),
+        (together(weighted("direction", 1.0), weighted("pose", 1.0)), "direction and pose, which"),
+        (together(weighted("point", 1.0), weighted("point", 1.0)), "tasks holds point twice"),
+        (together(weighted("position", 1.0), weighted("", 1.0)), "an empty task"),
+    ],
+)
+def test_the_newer_kinds_of_target_are_refused_with_one_clear_sentence(
+    message: pb.Target, said: str
+) -> None:
+    with pytest.raises(TargetRejected) as refused:
+        PAPER.target(message)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_direction_point_and_tasks_become_targets() -> None:
+    direction = PAPER.target(direction_target((0.0, 3.0, 4.0)))
+    assert isinstance(direction, DirectionTarget)
+    np.testing.assert_allclose(direction.direction, [0.0, 0.6, 0.8])
+    point = PAPER.target(point_target((0.0, 0.0, 0.1), 0.5))
+    assert isinstance(point, PointTarget)
+    assert point.station == 0.5
+    several = PAPER.target(
+        together(weighted("pose", 2.0), weighted("point", 0.5), weighted("posture", 1.0))
+    )
+    assert isinstance(several, TasksTarget)
+    assert several.weights == ((2.0, 2.0), (0.5, 0.5), (1.0, 1.0))
+    apart = PAPER.target(together(weighted("pose", 2.0, orientation_weight=0.25)))
+    assert isinstance(apart, TasksTarget)
+    assert apart.weights == ((2.0, 0.25),)

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import tomllib
 from importlib.resources import files
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controllers.arm import HalfSpace, Sphere
 from controllers.controller import Controller
 from controllers.errors import ConfigurationError
 from service.cli import PRESETS as CLI_PRESETS
@@ -250,3 +252,37 @@ def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path) ->
     two = real | {"sections": [SECTION, SECTION]}
     (line,) = refusals(tmp_path, tomli_w.dumps({"simulator": {"arm": two}}))
     assert "simulator.arm has 2 sections, arm has 1" in line
+
+
+WALL = {"shape": "half_space", "normal": [0.0, 0.0, 2.0], "offset_mm": 320.0}
+
+
+def with_keep_outs(*places: dict[str, object], **arm: object) -> dict[str, object]:
+    tables = tomllib.loads(files("service").joinpath("presets", "paper.toml").read_text())
+    tables["arm"] |= {"keep_outs": list(places), **arm}
+    return tables
+
+
+def test_keep_outs_become_the_arms_in_metres() -> None:
+    ball = {"shape": "sphere", "center_mm": [100.0, 0.0, 200.0], "radius_mm": 30.0}
+    configuration = check(with_keep_outs(WALL, ball, body_radius_mm=45.0))
+    assert check(tomllib.loads(configuration.to_toml())) == configuration
+    arm = configuration.build_arm()
+    assert arm.keep_outs == (HalfSpace((0.0, 0.0, 1.0), 0.32), Sphere((0.1, 0.0, 0.2), 0.03))
+    assert arm.body_radius_m == pytest.approx(0.045)
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        (WALL | {"radius_mm": 3.0}, "a half_space has the keys normal and offset_mm"),
+        ({"shape": "sphere", "radius_mm": 3.0}, "a sphere has the keys center_mm and radius_mm"),
+        (WALL | {"normal": [0.0, 0.0, 0.0]}, "points nowhere"),
+        (WALL | {"shape": "cube"}, "arm.keep_outs"),
+        (WALL | {"offset_mm": 190.0}, "keep_outs[0] contains a part of section 1"),
+    ],
+)
+def test_a_wrong_keep_out_is_refused(place: dict[str, object], said: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        check(with_keep_outs(place))
+    assert said in str(refused.value)

@@ -42,6 +42,7 @@ SECTION = {
     "length_max_mm": 300.0,
     "bend_max_deg": 150.0,
     "length_rate_max_mm_s": 200.0,
+    "length_acceleration_max_mm_s2": 4000.0,
     "pressure_min_bar": -0.9,
     "pressure_max_bar": 0.9,
     "pressure_slew_max_bar_s": 4.0,

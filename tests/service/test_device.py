@@ -14,6 +14,7 @@ from controllers.errors import HardwareError
 from hardware.emulation import EmulatedArm
 from hardware.festo_cpx.emulator import EmulatedCpx
 from hardware.festo_cpx.protocol import CpxLayout
+from hardware.guard import Guard
 from service.config import Configuration, check, load
 from service.device import WARM_UP_COMMANDS, DeviceProcess
 from service.device_link import DeviceLink, DeviceWatch, LinkedDevice, LinkState
@@ -21,12 +22,14 @@ from tests.hardware.festo_bench import WATCHDOG, Served
 
 SOME_PA = np.array([[2e4, -1e4, 1e4]])
 ZEROS = np.zeros((1, 3))
+MAX_AGE_S = 0.3
 
 
 def configuration_for(port: int) -> Configuration:
     tables = load(None, "paper").model_dump()
     tables["hardware"] = {"adapter": "festo-cpx"}
     tables["festo_cpx"] = {"host": "127.0.0.1", "port": port, "valve_range": "vacuum"}
+    tables["festo_cpx"] |= {"timeout_ms": 150.0, "watchdog_ms": 400}
     return check(tables)
 
 
@@ -87,7 +90,9 @@ class Rig:
 
 
 @pytest.fixture
-def rig() -> Iterator[Rig]:
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
+    # Commands get old later than in a laboratory: this process has no priority over others.
+    monkeypatch.setattr(Guard, "MAX_AGE_S", MAX_AGE_S)
     arm = EmulatedArm(load(None, "paper").build_arm(), 0)
     terminal = Terminal(arm)
     with Served(terminal) as served:
@@ -102,7 +107,7 @@ def test_nothing_but_zeros_before_control_is_warm_and_has_asked_to_vent(rig: Rig
         rig.process.step()
         rig.process.step()
     assert rig.state == LinkState.CONNECTED
-    time.sleep(0.1)  # old by now, but the loop has not begun
+    time.sleep(MAX_AGE_S + 0.05)  # old by now, but the loop has not begun
     rig.process.step()
     assert rig.state == LinkState.CONNECTED
     rig.run(0.1, SOME_PA)  # warm, but never vented since it was connected
@@ -126,7 +131,7 @@ def test_the_slew_holds_at_the_terminal_and_its_intervention_is_told(rig: Rig) -
 
 def test_a_loop_that_stands_still_gets_zeros_then_silence_and_is_not_covered(rig: Rig) -> None:
     rig.active()
-    time.sleep(0.06)
+    time.sleep(MAX_AGE_S + 0.05)
     rig.process.step()
     assert rig.state == LinkState.SILENT
     time.sleep(0.02)
@@ -136,7 +141,7 @@ def test_a_loop_that_stands_still_gets_zeros_then_silence_and_is_not_covered(rig
         rig.process.step()
         time.sleep(0.005)
     assert rig.terminal.asked == asked
-    with pytest.raises(HardwareError, match=r"no command for 50 ms"):
+    with pytest.raises(HardwareError, match=r"no command for 300 ms"):
         rig.control.read(time.monotonic())
     rig.run(0.2, SOME_PA)  # awake again, and as if nothing had been
     assert rig.state == LinkState.CONNECTED
