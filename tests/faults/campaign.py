@@ -64,6 +64,10 @@ class FaultRun:
             self._fault.inject(rig, injection)
             if rig.alive:
                 rig.stop_and_reset(injection)
+        except KeyboardInterrupt:  # half an injection proves nothing
+            self.row.injections = [i for i in self.row.injections if i is not injection]
+            self._unaudited = [i for i in self._unaudited if i is not injection]
+            raise
         except _FAILED as error:
             if injection not in self.row.injections:
                 self.row.injections.append(injection)
