@@ -184,32 +184,28 @@ def machine() -> str:
     )
 
 
+_HEAD = (
+    "# Benchmarks",
+    "",
+    "Written by `make bench`; nothing is typed in. Times are compared within one run, because a",
+    "machine's are its own; the rest runs the real loop in simulated time against simulated arms",
+    "whose parameters vary by 20 %. What is not met is left as it was measured.",
+)
+
+
 def page(found: Results) -> str:
     """The page; a row whose benchmark never ran says so."""
-    lines = [
-        "# Benchmarks",
-        "",
-        "Written by `make bench`; nothing is typed in. Times are compared within one run, because a "
-        "machine's are its own; the rest runs the real loop in simulated time against simulated "
-        "arms whose parameters vary by 20 %. What is not met is left as it was measured.",
-        "",
-        f"Machine: {machine()}.",
-        "",
-        "| what | asked for | measured |",
-        "|---|---|---|",
-    ]
+    lines = [*_HEAD, "", f"Machine: {machine()}.", ""]
+    lines += ["| what | asked for | measured |", "|---|---|---|"]
     for row in ROWS:
         try:
             value = row.value(found)
         except KeyError as error:
             value = f"not measured ({error.args[0]})"
         lines.append(f"| {row.what} | {row.asked} | {value} |")
-    lines += [
-        "",
-        "What each figure is, and how it is taken, stands at the head of its program in",
-        "",
-    ]
-    lines[-1:] = ["`tests/bench/`: " + ", ".join(f"`{name}.py`" for name in BENCHMARKS) + "."]
+    programs = ", ".join(f"`{name}.py`" for name in BENCHMARKS)
+    lines += ["", "How a figure is taken stands at the head of its program in `tests/bench/`:"]
+    lines += [f"{programs}."]
     return "\n".join(lines) + "\n"
 
 
