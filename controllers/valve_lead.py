@@ -27,7 +27,13 @@ class ValveLead:
         self._last = None
 
     def sent_pa(self, wanted_pa: Array, dt_s: float) -> Array:
-        """Pressures ahead of the wanted ones by the lag."""
+        """Pressures ahead of the wanted ones by the lag.
+
+        Pressures that are no finite numbers are returned as they are, and forgotten.
+        """
+        if not np.isfinite(wanted_pa).all():
+            self.forget()
+            return wanted_pa
         if self._last is None or dt_s <= 0.0:
             self._last, self._rate = wanted_pa, np.zeros_like(wanted_pa)
             return wanted_pa
