@@ -29,9 +29,13 @@ class ValveLead:
         self._last = None
 
     def sent_pa(self, wanted_pa: Array, dt_s: float) -> Array:
-        """Pressures ahead of the wanted ones by the lag."""
+        """Pressures ahead of the wanted ones by the lag.
+
+        Pressures that are no finite numbers are returned as they are, and forgotten: they are the
+        guard's affair, and no derivative must remember them.
+        """
         if not math.isfinite(float(wanted_pa.sum())):
-            self.forget()  # the guard's affair; no derivative must remember it
+            self.forget()
             return wanted_pa
         if self._last is None or dt_s <= 0.0:
             self._last, self._rate = wanted_pa, np.zeros_like(wanted_pa)
