@@ -77,12 +77,16 @@ class Detour:
         inside = self._low_m <= min(lengths) and max(lengths) <= self._high_m
         return np.array([lengths]) if inside else None
 
-    def begins(self, error_m: float, dt_s: float) -> bool:
-        """Say whether to begin the detour now, with this error of the tip."""
+    def begins(self, error_m: float, dt_s: float, stalled: bool) -> bool:
+        """Say whether to begin the detour now, with this error of the tip.
+
+        ``stalled`` says that the tip comes nearer too slowly to wait for it.
+        """
         if self.goal_m is None or self.taken:
             return False
         self._stuck_s += dt_s
         if self._best_m - error_m >= _LEAST_M or self._best_m == math.inf:
             self._best_m, self._stuck_s = error_m, 0.0
-        self.taken = self._stuck_s >= _PATIENCE_S and error_m > self._goal_error_m + _BETTER_M
+        stuck = stalled or self._stuck_s >= _PATIENCE_S
+        self.taken = stuck and error_m > self._goal_error_m + _BETTER_M
         return self.taken
