@@ -46,7 +46,7 @@ class Detour:
 
     def set_target(self, target: Target | None, offset_m: Array) -> None:
         """Find the goal of a new target; ``offset_m`` (3,) is what is measured beside the model."""
-        if not self._possible or not isinstance(target, PositionTarget):
+        if not self._possible or not isinstance(target, PositionTarget) or _moves(target):
             self.goal_m, self._position_m, self.taken = None, None, False
             return
         before, self._position_m = self._position_m, target.position_m
@@ -90,3 +90,8 @@ class Detour:
         stuck = stalled or self._stuck_s >= _PATIENCE_S
         self.taken = stuck and error_m > self._goal_error_m + _BETTER_M
         return self.taken
+
+
+def _moves(target: PositionTarget) -> bool:
+    """A position on its way is followed with its velocity, which a detour knows nothing of."""
+    return target.velocity_m_s is not None and any(target.velocity_m_s.tolist())
