@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo faults test check validate bench-setup proto lock clean
+.PHONY: setup demo faults test check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -39,6 +39,10 @@ check: setup
 # The finite elements are recorded; `python -m tests.validation.finite_elements` solves them anew.
 validate: bench-setup
 	$(BIN)/python -m service.validation.report --out docs
+
+# Every benchmark, one after another, on a machine that does nothing else; writes its table.
+bench: bench-setup
+	$(BIN)/python -m tests.bench.report --write docs/benchmarks.md
 
 # The peers that the benchmarks compare with; nothing else needs them.
 bench-setup: setup

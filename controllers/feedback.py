@@ -25,7 +25,7 @@ _FAST_S, _SCATTER_S = 0.02, 0.5
 _QUICK_S, _SLOW_S, _STILL_M = 0.03, 0.2, 2e-4
 
 #: The correction of a tip that stands still goes so many times faster.
-_WHEN_STILL = 4.0
+_WHEN_STILL = 2.0
 
 #: An estimate is never told to be better than this (m): no camera sees an arm more exactly.
 _LEAST_SIGMA_M = 5e-5
@@ -43,16 +43,17 @@ class FeedbackSettings:
     enabled: bool = True
     delay_s: float = 0.01
     timeout_s: float = 0.1
-    time_constant_s: float = 0.4
+    time_constant_s: float = 0.2
     rate_max_m_s: float = 0.1
-    deadband_m: float = 1.5e-4
+    deadband_m: float = 1e-4
     jump_max_m: float = 0.02
     jump_accept_s: float = 0.5
     model_sigma_m: float = 0.025
     length_sigma_m: float = 0.01
     dither_pa: float = 1500.0
     dither_period_s: float = 0.03
-    hysteresis_share: float = 0.55
+    hysteresis_share: float = 0.45
+    hysteresis_share_moving: float = 0.65
 
 
 class Verdict(Enum):
@@ -104,6 +105,8 @@ class TipObserver:
         self._since_pose_s = 0.0
         never = math.isinf(self._since_taken_s)
         largest = 3.0 * settings.model_sigma_m if never else settings.jump_max_m
+        if not never and pause_s > settings.timeout_s:  # what was not seen may have wandered
+            largest += settings.rate_max_m_s * pause_s
         if _norm(residual - self._residual) <= largest:
             self._candidate = None
             return Verdict.TAKEN

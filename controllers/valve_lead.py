@@ -5,6 +5,8 @@ which is the lag that remains. It works behind the inverse of the chambers' hyst
 in the chamber turns where the wanted one turns, not where the lead before it does.
 """
 
+import math
+
 import numpy as np
 
 from controllers.arm import Array
@@ -27,7 +29,14 @@ class ValveLead:
         self._last = None
 
     def sent_pa(self, wanted_pa: Array, dt_s: float) -> Array:
-        """Pressures ahead of the wanted ones by the lag."""
+        """Pressures ahead of the wanted ones by the lag.
+
+        Pressures that are no finite numbers are returned as they are, and forgotten: they are the
+        guard's affair, and no derivative must remember them.
+        """
+        if not math.isfinite(float(wanted_pa.sum())):
+            self.forget()
+            return wanted_pa
         if self._last is None or dt_s <= 0.0:
             self._last, self._rate = wanted_pa, np.zeros_like(wanted_pa)
             return wanted_pa

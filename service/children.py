@@ -32,6 +32,9 @@ def enter(name: str, arguments: tuple[object, ...]) -> None:
     except PneuarmError as error:
         print(f"ERROR      {name}: {error}", file=sys.stderr, flush=True)
         os._exit(1)  # a library's threads might keep the process from ending
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)  # nothing is left to do, and the garbage of a frozen heap is nobody's business
 
 
 class Child:

@@ -1,91 +1,86 @@
-"""`pneuarm demo`: the daemon as one process, its client as another, and what came of it."""
+"""`pneuarm demo`: the daemon as one process, its client as another, and what came of it.
+
+The simulated arm draws the same figure of eight three times: with the nominal model, calibrated,
+and calibrated with its tip measured. All of it is one recording in Rerun. A device, or its
+emulator, has one run: its tip is not known.
+"""
 
 import argparse
 import json
-import os
-import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-import tomli_w
-
 from controllers.errors import DaemonUnreachable, InvalidInput, PneuarmError
-from logs.reader import LogReader
 from service.client import Client
+from service.config import Configuration, check, load
 from service.demo_device import emulated
+from service.demo_figures import Drawn, Figures, evaluate, table
+from service.demo_parts import Part, parts, tables
+from service.demo_screen import Screen
 
 _START_S = 30.0
-
-
-@dataclass(frozen=True)
-class Figures:
-    """What `pneuarm demo --json` prints; latencies in microseconds."""
-
-    ticks: int
-    rate_hz: float
-    overruns: int
-    wake_us: dict[str, float]
-    compute_us: dict[str, float]
-    missing_records: int
-    tip_rms_error_mm: float
-    log: str
-    log_bytes: int
+_END_S = 70.0  # the daemon's own last resort comes after 60 s
 
 
 def demo(arguments: argparse.Namespace) -> int:
     """Run the show and print its table."""
     if not arguments.seconds >= 1.0:
         raise InvalidInput(f"--seconds {arguments.seconds:g}: at least 1 is needed")
-    quiet = arguments.json
-    with (
-        tempfile.TemporaryDirectory(prefix="pneuarm-demo-") as folder,
-        emulated(arguments.adapter, arguments.arm, arguments.seed) as device,
-    ):
-        endpoint = f"tcp/127.0.0.1:{_free_port()}"
-        config = Path(folder) / "demo.toml"
-        config.write_text(_configuration(arguments, endpoint, device))
-        daemon = subprocess.Popen(
-            [sys.executable, "-m", "pneuarm", "run", str(config)],
-            stdout=sys.stderr if quiet else None,
-            start_new_session=True,  # Ctrl-C ends the show first, then the daemon
-        )
-        try:
-            log = _wait_for_daemon(daemon, arguments.arm, endpoint)
-            phases = _run_client(arguments, endpoint)
-        finally:
-            daemon.send_signal(signal.SIGTERM)
-            status = daemon.wait(60)
-    if status != 0:
-        raise PneuarmError(f"the daemon ended with status {status}; see its lines above")
-    figures = evaluate(log, phases)
-    print(json.dumps(asdict(figures)) if quiet else table(figures))
+    with emulated(arguments.adapter, arguments.arm, arguments.seed) as device:
+        configuration = check(_laid_over(arguments, device), "the demo")
+        with Screen(configuration) as screen:
+            drawn = [
+                _play(part, configuration, screen, arguments)
+                for part in parts(configuration, arguments.seconds)
+            ]
+    figures = evaluate(drawn)
+    print(json.dumps(asdict(figures)) if arguments.json else table(figures))
     return 0
 
 
-def _configuration(arguments: argparse.Namespace, endpoint: str, device: dict[str, object]) -> str:
-    return tomli_w.dumps(
-        device
-        | {
-            "preset": arguments.arm,
-            "simulator": {"seed": arguments.seed},
-            "zenoh": {"listen": [endpoint]},
-            "rerun": {"port": _free_port(), "open_viewer": True},
-        }
+def _laid_over(arguments: argparse.Namespace, device: dict[str, object]) -> dict[str, object]:
+    nominal = load(preset=arguments.arm).model_dump(exclude_none=True)
+    return nominal | device | tables(arguments.seed)
+
+
+def _play(
+    part: Part, nominal: Configuration, screen: Screen, arguments: argparse.Namespace
+) -> Drawn:
+    """Run one daemon and its client; return where the part's records are."""
+    configuration = part.configuration()
+    endpoint = configuration.zenoh.listen[0]
+    with tempfile.TemporaryDirectory(prefix="pneuarm-demo-") as folder:
+        path = Path(folder) / "demo.toml"
+        path.write_text(configuration.to_toml())
+        with _daemon(path, arguments.json) as daemon:
+            log = _wait_for_daemon(daemon, arguments.arm, endpoint)
+            screen.caption(part.caption)
+            with _camera(part, arguments.arm, endpoint):
+                phases = _run_client(part, nominal, endpoint)
+    return Drawn(part.name, log, phases)
+
+
+@contextmanager
+def _daemon(config: Path, quiet: bool) -> "Iterator[subprocess.Popen[bytes]]":
+    daemon = subprocess.Popen(
+        [sys.executable, "-m", "pneuarm", "run", str(config)],
+        stdout=sys.stderr if quiet else None,
+        start_new_session=True,  # Ctrl-C ends the show first, then the daemon
     )
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    try:
+        yield daemon
+    finally:
+        daemon.send_signal(signal.SIGTERM)
+        status = daemon.wait(_END_S)
+    if status != 0:
+        raise PneuarmError(f"the daemon ended with status {status}; see its lines above")
 
 
 def _wait_for_daemon(daemon: "subprocess.Popen[bytes]", arm: str, endpoint: str) -> Path:
@@ -103,13 +98,36 @@ def _wait_for_daemon(daemon: "subprocess.Popen[bytes]", arm: str, endpoint: str)
             time.sleep(0.1)
 
 
-def _run_client(arguments: argparse.Namespace, endpoint: str) -> dict[str, list[int]]:
+@contextmanager
+def _camera(part: Part, arm: str, endpoint: str) -> Iterator[None]:
+    """Let a simulated motion capture see the tip, where the part has one."""
+    if not part.camera:
+        yield
+        return
+    camera = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "pneuarm", "emulate", "camera"),
+            *("--arm", arm, "--connect", endpoint),
+        ],
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        yield
+    finally:
+        camera.terminate()
+        camera.wait(10)
+
+
+def _run_client(part: Part, nominal: Configuration, endpoint: str) -> dict[str, list[int]]:
+    """Let the client draw; the size of the figures is that of the nominal arm in every part."""
     client = subprocess.run(
         [
-            *(sys.executable, "-m", "service.demo_client"),
-            *(arguments.arm, endpoint, str(arguments.seconds)),
+            *(sys.executable, "-m", "service.demo_client", nominal.arm.name, endpoint),
+            json.dumps({"label": part.name, "camera": part.camera, "seconds": part.seconds}),
         ],
         stdout=subprocess.PIPE,
+        input=nominal.to_toml().encode(),
         check=False,
     )
     if client.returncode != 0:
@@ -118,72 +136,4 @@ def _run_client(arguments: argparse.Namespace, endpoint: str) -> dict[str, list[
     return phases
 
 
-def evaluate(log: Path, phases: dict[str, list[int]]) -> Figures:
-    """Read the figures of the show from its log."""
-    reader = LogReader(log)
-    ticks = reader.ticks()
-    numbers = ticks["sequence"]
-    span_s = (int(ticks["time_unix_ns"][-1]) - int(ticks["time_unix_ns"][0])) * 1e-9
-    # Only a simulated arm knows its true tip; a device's is the estimate.
-    known = not np.isnan(ticks["tip_true_position_m"]).all()
-    tip = ticks["tip_true_position_m" if known else "tip_estimated_position_m"]
-    error = tip - ticks["target_position_m"]
-    drawn = np.zeros(len(ticks), dtype=bool)
-    for first, last in phases.values():
-        drawn |= (numbers >= first) & (numbers <= last)
-    square = (error[drawn] ** 2).sum(axis=1)
-    return Figures(
-        ticks=len(ticks),
-        rate_hz=(len(ticks) - 1) / span_s,
-        overruns=int(ticks["overruns"][-1]),
-        wake_us=_latency(ticks["wake_latency_s"]),
-        compute_us=_latency(ticks["compute_s"][1:]),
-        missing_records=int(numbers[-1]) - len(np.unique(numbers)),
-        tip_rms_error_mm=1e3 * float(np.sqrt(np.nanmean(square))),
-        log=str(log),
-        log_bytes=sum(part.stat().st_size for part in reader.parts),
-    )
-
-
-def _latency(seconds: np.ndarray) -> dict[str, float]:
-    p50, p99 = np.percentile(seconds, (50, 99)) * 1e6
-    maximum = float(seconds.max()) * 1e6
-    return {"p50": round(p50, 2), "p99": round(p99, 2), "max": round(maximum, 2)}
-
-
-def table(figures: Figures) -> str:
-    """Return the figures for people, and how to see the session again."""
-    wake, compute = figures.wake_us, figures.compute_us
-    row = "{:18} {:>12}   {}".format
-    lines = [
-        "",
-        row("ticks", figures.ticks, f"{figures.rate_hz:.2f} Hz, {figures.overruns} overruns"),
-        row("wake latency", f"{wake['p50']:.1f} us", _tail(wake)),
-        row("computing time", f"{compute['p50']:.1f} us", _tail(compute)),
-        row("records missing", figures.missing_records, ""),
-        row(
-            "tip error RMS",
-            f"{figures.tip_rms_error_mm:.2f} mm",
-            "tip (true; estimated behind a device) against the reference, circle and eight; "
-            "uncalibrated, no tip feedback",
-        ),
-        row("log", f"{figures.log_bytes / 1e6:.1f} MB", figures.log),
-        "",
-        "see it again:",
-        f"  {_program('pneuarm')} replay {figures.log}",
-        f"  {_program('rerun')} {figures.log}",
-    ]
-    return "\n".join(line.rstrip() for line in lines)
-
-
-def _program(name: str) -> str:
-    """Return how to call a program of this environment from here."""
-    own = Path(sys.executable).with_name(name)
-    found = shutil.which(name)
-    if found is not None and Path(found).samefile(own):
-        return name
-    return os.path.relpath(own)
-
-
-def _tail(latency: dict[str, float]) -> str:
-    return f"median; p99 {latency['p99']:.1f} us, max {latency['max']:.1f} us"
+__all__ = ["Figures", "demo"]

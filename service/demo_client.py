@@ -1,7 +1,7 @@
 """The client of `pneuarm demo`, a process of its own: circle, eight, a point out of reach, home.
 
-It uses nothing but the public client. On stdout it prints one JSON object with the tick numbers
-at which each phase began and ended.
+It uses nothing but the public client. The figures' size is that of the arm whose configuration
+comes on stdin; on stdout it prints one JSON object with the first and last tick of each phase.
 """
 
 import json
@@ -15,14 +15,17 @@ import numpy as np
 
 from controllers.actuation import length_bounds_m
 from controllers.arm import Arm
+from controllers.errors import DaemonUnreachable
+from logs.schema import pneuarm_pb2 as pb
 from service.client import Client
 from service.config import check
 
 _RATE_HZ = 100.0
+_CAMERA_S = 10.0
 _TURN_S = 4.0
 
-#: Shares of the whole time.
-_CIRCLE, _EIGHT = 0.45, 0.45
+#: Step of time (s) for the velocity along a path.
+_STEP_S = 1e-4
 
 Path = Callable[[float], tuple[float, float, float]]
 
@@ -35,12 +38,14 @@ def _figures(arm: Arm) -> tuple[float, float]:
 
 
 def _draw(client: Client, path: Path, seconds: float, label: str) -> tuple[int, int]:
-    """Send a path for some whole turns; return the first and last tick of it."""
+    """Send a path for some time; return the first and last tick of it."""
     client.move_to(path(0.0))
     first = client.state().sequence
     began_s = next_s = time.monotonic()
     while (elapsed_s := time.monotonic() - began_s) < seconds:
-        client.send_position(path(elapsed_s))
+        position = np.array(path(elapsed_s))
+        velocity = (np.array(path(elapsed_s + _STEP_S)) - position) / _STEP_S
+        client.send_position(position.tolist(), velocity_m_s=velocity.tolist())
         client.raise_if_refused()
         _progress(label, elapsed_s / seconds)
         next_s += 1.0 / _RATE_HZ
@@ -51,39 +56,54 @@ def _draw(client: Client, path: Path, seconds: float, label: str) -> tuple[int, 
 def _progress(label: str, share: float) -> None:
     if sys.stderr.isatty():
         bar = "#" * int(30 * share)
-        print(f"\r{label:14} [{bar:30}]", end="", file=sys.stderr, flush=True)
+        print(f"\r{label:32} [{bar:30}]", end="", file=sys.stderr, flush=True)
 
 
-def perform(client: Client, seconds: float) -> dict[str, tuple[int, int]]:
-    """Go through the whole show in about ``seconds``."""
-    arm = check(tomllib.loads(client.info().config_toml)).build_arm()
+def perform(
+    client: Client, arm: Arm, label: str, seconds: dict[str, float]
+) -> dict[str, tuple[int, int]]:
+    """Go through the phases that ``seconds`` names; 0 is at the figures' middle."""
     height, radius = _figures(arm)
-    turn_s = min(_TURN_S, _CIRCLE * seconds)
-    omega = 2.0 * math.pi / turn_s
 
     def circle(t: float) -> tuple[float, float, float]:
-        return radius * math.cos(omega * t), radius * math.sin(omega * t), height
+        angle = 2.0 * math.pi * t / min(_TURN_S, seconds["circle"])
+        return radius * math.cos(angle), radius * math.sin(angle), height
 
     def eight(t: float) -> tuple[float, float, float]:
-        sine = math.sin(omega * t)
-        return radius * sine, radius * sine * math.cos(omega * t), height
+        angle = 2.0 * math.pi * t / min(_TURN_S, seconds["eight"])
+        return radius * math.sin(angle), 0.5 * radius * math.sin(2.0 * angle), height
 
     phases = {}
-    client.enable()
-    phases["circle"] = _draw(client, circle, _CIRCLE * seconds, "circle")
-    phases["eight"] = _draw(client, eight, _EIGHT * seconds, "figure of eight")
-    _progress("out of reach", 0.5)
-    client.move_to((1.5 * height, 0.0, 0.5 * height))
-    _progress("home", 0.9)
+    for name, path in (("circle", circle), ("eight", eight)):
+        if name in seconds:
+            phases[name] = _draw(client, path, seconds[name], f"{label}: {name}")
+    if "out of reach" in seconds:
+        _progress(f"{label}: out of reach", 0.5)
+        client.move_to((1.5 * height, 0.0, 0.5 * height))
+    _progress(f"{label}: home", 0.9)
     client.move_to((0.0, 0.0, height))
     return phases
 
 
+def _wait_for_camera(client: Client) -> None:
+    """Wait until measured tip poses arrive."""
+    give_up_s = time.monotonic() + _CAMERA_S
+    while client.state().tip_estimated_source != pb.FROM_TIP_POSE:
+        if time.monotonic() > give_up_s:
+            raise DaemonUnreachable("no measured tip pose arrives from the simulated camera")
+        time.sleep(0.02)
+
+
 def main() -> int:
-    """Run against the daemon named on the command line: arm, endpoint, seconds."""
-    arm, endpoint, seconds = sys.argv[1:4]
-    with Client(arm, endpoint, "demo") as client:
-        phases = perform(client, float(seconds))
+    """Run against the daemon named on the command line: arm, endpoint, what to do as JSON."""
+    name, endpoint = sys.argv[1:3]
+    wanted = json.loads(sys.argv[3])
+    arm = check(tomllib.loads(sys.stdin.read())).build_arm()
+    with Client(name, endpoint, "demo") as client:
+        client.enable()
+        if wanted["camera"]:
+            _wait_for_camera(client)
+        phases = perform(client, arm, wanted["label"], wanted["seconds"])
     print(json.dumps(phases))
     return 0
 

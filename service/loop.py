@@ -242,9 +242,11 @@ class Loop:
         return ModeReply(request.request_id, not reason, reason, self._keeper.mode, self.sequence)
 
     def _arm(self, before: Mode) -> None:
-        """Start without a jump: from what was last sent in hold, else from the measurement."""
-        measured = np.clip(self._tick["pressure_measured_pa"], self._low, self._high)
-        self._steering.start_from(self._wanted if before == Mode.HOLD else measured)
+        """Start without a jump: from what is held, else from the measurement."""
+        if before != Mode.HOLD:
+            # Kept too, for a hold that comes before the first step.
+            self._wanted = np.clip(self._tick["pressure_measured_pa"], self._low, self._high)
+        self._steering.start_from(self._wanted)
         self._target = None
 
     def _watch(self, now_s: float, disk: Disk) -> None:
@@ -271,11 +273,11 @@ class Loop:
     def _control(self, dt_s: float, now_s: float) -> Array:
         """Return the pressures wanted now, by mode."""
         if self._keeper.mode == Mode.ACTIVE:
-            self._wanted = self._steering.step(dt_s)
+            wanted = self._steering.step(dt_s)
             self._tell_fallbacks()
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
-            setpoints = self._steering.sent_pa(self._wanted, dt_s, now_s)
-            return np.minimum(np.maximum(setpoints, self._low), self._high)
+            setpoints = self._steering.sent_pa(wanted, dt_s, now_s)
+            return self._kept(wanted, setpoints)
         self._tick["tip_commanded_position_m"] = np.nan
         ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
         if ramping is not None:
@@ -283,6 +285,17 @@ class Loop:
         if self._keeper.mode == Mode.HOLD:
             return self._wanted  # what the chambers have or are about to have, without any lead
         return self._sent  # in the vented modes it is zero already
+
+    def _kept(self, wanted: Array, setpoints: Array) -> Array:
+        """Keep what is wanted for a hold; return its setpoints, whose lead stays in the limits.
+
+        What is wanted outside of them, or is no number, is for the guard to see and to count.
+        """
+        in_range = np.minimum(np.maximum(wanted, self._low), self._high)
+        if (in_range == wanted).all():  # never true of a NaN
+            self._wanted = wanted
+            return np.minimum(np.maximum(setpoints, self._low), self._high)
+        return wanted
 
     def _tell_fallbacks(self) -> None:
         """Tell that the QP gave nothing and the damped law went on, once in a while."""

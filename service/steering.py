@@ -24,8 +24,11 @@ Tell = Callable[["pb.Level", str, str, str, str], None]
 
 _NONE = np.full(3, np.nan)
 
-#: The dither grows from nothing in this time (s).
+#: The dither grows from nothing, and a share of the hysteresis from 0 to 1, in this time (s).
 _DITHER_RAMP_S = 0.3
+
+#: A reference faster than this (m/s) moves the arm through its hysteresis by itself.
+_MOVING_M_S = 0.005
 
 
 class Steering:
@@ -56,6 +59,7 @@ class Steering:
         self._seen = self._refusing = False
         self._told_error = ""
         self._near = False
+        self._share = 1.0
         self._dither_since_s: float | None = None
         self._dt_s = period_s
 
@@ -139,6 +143,7 @@ class Steering:
         """
         if self._target is None:
             self._dither_since_s = None
+            self._share = 1.0
             self._controller.set_hysteresis_share(1.0)
             return 0.0
         if self._dither_since_s is None:
@@ -146,9 +151,17 @@ class Steering:
                 return 0.0
             self._dither_since_s = now_s
         share = min(1.0, (now_s - self._dither_since_s) / _DITHER_RAMP_S)
-        less = 1.0 - self._feedback.hysteresis_share
-        self._controller.set_hysteresis_share(1.0 - share * less)
+        self._follow_share()
         return share * self._dither.at_pa(now_s)
+
+    def _follow_share(self) -> None:
+        """Let the inverted share of the hysteresis go to that of an arm that moves, or rests."""
+        motion, feedback = self._follower.motion, self._feedback
+        moving = motion is not None and max(map(abs, motion.velocity[:3])) > _MOVING_M_S
+        wanted = feedback.hysteresis_share_moving if moving else feedback.hysteresis_share
+        largest = self._dt_s / _DITHER_RAMP_S
+        self._share += min(max(wanted - self._share, -largest), largest)
+        self._controller.set_hysteresis_share(self._share)
 
     def observe(self, vented: bool) -> None:
         """Let the observer see this tick's command; tell when the camera is lost or back."""

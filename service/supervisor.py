@@ -81,7 +81,7 @@ class Supervisor:
         read_config(configuration.zenoh.config_file)
         for endpoint in configuration.zenoh.listen:
             check_free("zenoh.listen", endpoint)
-        if configuration.rerun.enabled:
+        if configuration.rerun.enabled and configuration.rerun.start_server:
             rerun = configuration.rerun
             check_free("rerun.port", f"tcp/{rerun.bind}:{rerun.port}")
 

@@ -31,16 +31,17 @@ class FeedbackConfig(Table):
     enabled: bool = True
     camera_delay_ms: Annotated[float, Field(ge=0, le=300)] = 10.0
     camera_timeout_ms: Annotated[float, Field(ge=20, le=5000)] = 100.0
-    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 400.0
+    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 200.0
     rate_max_mm_s: Positive = 100.0
-    deadband_mm: Annotated[float, Field(ge=0, le=5)] = 0.15
+    deadband_mm: Annotated[float, Field(ge=0, le=5)] = 0.1
     jump_max_mm: Positive = 20.0
     jump_accept_s: Annotated[float, Field(gt=0, le=60)] = 0.5
     model_sigma_mm: Positive = 25.0
     length_sigma_mm: Positive = 10.0
     dither_mbar: Annotated[float, Field(ge=0, le=100)] = 15.0
     dither_period_ms: Annotated[float, Field(ge=4, le=1000)] = 30.0
-    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.55
+    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.45
+    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.65
 
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""
@@ -58,4 +59,5 @@ class FeedbackConfig(Table):
             dither_pa=self.dither_mbar * _MBAR,
             dither_period_s=self.dither_period_ms * 1e-3,
             hysteresis_share=self.hysteresis_share,
+            hysteresis_share_moving=self.hysteresis_share_moving,
         )

@@ -29,46 +29,98 @@ _MOST_STEPS = 1000
 
 
 class Watch:
-    """Counts steps that leave a limit: length, bend, pressure, its slew, rate, acceleration."""
+    """Counts steps that leave a limit: length, bend, pressure, its slew, rate, acceleration.
+
+    Steps are looked at in blocks: one by one the looking would take longer than the steps.
+    """
+
+    _BLOCK = 5000
 
     def __init__(self, arm: Arm) -> None:
         self._arm, self._limits, self._map = arm, Limits(arm), PressureMap(arm)
-        self.violations = self.steps = 0
-        self.touched: set[str] = set()
+        self._violations = self.steps = 0
+        self._touched: set[str] = set()
+        self._rows: list[tuple[Array, Array, Array]] = []
 
     def start(self, controller: Controller) -> None:
+        """Begin anew from where a controller stands."""
         self._lengths, self._rates = controller.lengths_m, np.zeros_like(controller.lengths_m)
 
     def see(self, lengths: Array) -> None:
-        """Check one step."""
-        arm, rates = self._arm, (lengths - self._lengths) / DT_S
+        """Take one step."""
+        self._rows.append((lengths, self._lengths, self._rates))
+        self._rates = (lengths - self._lengths) / DT_S
+        self._lengths = lengths
+        self.steps += 1
+        if len(self._rows) == self._BLOCK:
+            self._look()
+
+    @property
+    def violations(self) -> int:
+        """Steps that left a limit."""
+        self._look()
+        return self._violations
+
+    @property
+    def touched(self) -> set[str]:
+        """Limits that were met."""
+        self._look()
+        return self._touched
+
+    def _look(self) -> None:
+        if not self._rows:
+            return
+        lengths, before, rates_before = (
+            np.array(column) for column in zip(*self._rows, strict=True)
+        )
+        self._rows.clear()
+        left = self._left(lengths, before, rates_before)
+        self._violations += int((np.min(list(left.values()), axis=0) < 0.0).sum())
+        near = {"length": 2e-5, "bend": 2e-5, "pressure": 2e-5, "keep_out": 3e-4}
+        self._touched |= {
+            name for name, value in left.items() if value.min() < near.get(name, 1e-2)
+        }
+
+    def _left(self, lengths: Array, before: Array, rates_before: Array) -> dict[str, Array]:
+        """What is left of every limit at every step (steps,)."""
+        arm, rates = self._arm, (lengths - before) / DT_S
         pressures = self._map.pressures_pa(lengths)
-        slew = np.abs(pressures - self._map.pressures_pa(self._lengths)) / DT_S
-        change = np.abs(rates - self._rates) / DT_S
+        slew = np.abs(pressures - self._map.pressures_pa(before)) / DT_S
+        change = np.abs(rates - rates_before) / DT_S
+        shapes = shapes_from_lengths(lengths, arm.per_section("chamber_offset_m"))
+        bend = np.hypot(shapes[..., 1], shapes[..., 2])
+        free_bend = arm.per_section("chamber_offset_m")[:, 0] * (
+            arm.per_section("bend_max_rad")[:, 0] - bend
+        )
+
+        def least(values: Array) -> Array:
+            return values.reshape(len(lengths), -1).min(axis=1)
+
         left = {
-            "length": min(
-                (lengths - arm.per_chamber("length_min_m")).min(),
-                (arm.per_chamber("length_max_m") - lengths).min(),
+            "length": least(
+                np.minimum(
+                    lengths - arm.per_chamber("length_min_m"),
+                    arm.per_chamber("length_max_m") - lengths,
+                )
             ),
-            "bend": self._limits.bend.slack_m(lengths).min() + 1e-13,
+            "bend": least(free_bend) + 1e-13,
             "pressure": 1e-6
-            * min(
-                (pressures - arm.per_chamber("pressure_min_pa")).min() + 1e-6,
-                (arm.per_chamber("pressure_max_pa") - pressures).min() + 1e-6,
+            * least(
+                np.minimum(
+                    pressures - arm.per_chamber("pressure_min_pa"),
+                    arm.per_chamber("pressure_max_pa") - pressures,
+                )
+                + 1e-6
             ),
-            "slew": 1.0 - (slew / arm.per_chamber("pressure_slew_max_pa_s")).max() + 1e-9,
-            "rate": 1.0 - (np.abs(rates) / arm.per_chamber("length_rate_max_m_s")).max() + 1e-9,
-            "acceleration": 1.0
-            - (change / arm.per_chamber("length_acceleration_max_m_s2")).max()
+            "slew": least(1.0 - slew / arm.per_chamber("pressure_slew_max_pa_s")) + 1e-9,
+            "rate": least(1.0 - np.abs(rates) / arm.per_chamber("length_rate_max_m_s")) + 1e-9,
+            "acceleration": least(1.0 - change / arm.per_chamber("length_acceleration_max_m_s2"))
             + 1e-7,
         }
         if self._limits.curved[1:]:
-            left["keep_out"] = self._limits.keep_out.left_m(lengths).min() + 1e-13
-        self.violations += min(left.values()) < 0.0
-        near = {"length": 2e-5, "bend": 2e-5, "pressure": 2e-5, "keep_out": 3e-4}
-        self.touched |= {name for name, value in left.items() if value < near.get(name, 1e-2)}
-        self._lengths, self._rates = lengths, rates
-        self.steps += 1
+            keep_out = self._limits.keep_out
+            left["keep_out"] = np.array([keep_out.left_m(row).min() for row in lengths]) + 1e-13
+        return left
 
 
 def follow(controller: Controller, target: PositionTarget, watch: Watch) -> int:
@@ -201,7 +253,8 @@ def acceptance(arm: Arm, ticks: int, seed: int) -> dict[str, object]:
     """Share of usable results of OSQP along wild motions, with every limit there is touched."""
     reach = arm.total_rest_length_m
     ball = Sphere((0.6 * reach, 0.0, 0.8 * reach), 0.15 * reach)
-    section = replace(arm.sections[0], pressure_slew_max_pa_s=1.2e5, pressure_max_pa=0.8e5)
+    tight = {"pressure_slew_max_pa_s": 1.2e5, "pressure_max_pa": 0.5e5, "bend_max_rad": 1.2}
+    section = replace(arm.sections[0], **tight)
     arm = replace(arm, keep_outs=(ball,), body_radius_m=0.02, sections=(section, *arm.sections[1:]))
     rng, controller, watch = np.random.default_rng(seed), Controller(arm, SETTINGS), Watch(arm)
     place(controller, arm, arm.rest_lengths_m, watch)

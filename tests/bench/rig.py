@@ -153,6 +153,10 @@ class Rig:
         dtype = tick_dtype(self.arm.n_sections)
         return np.frombuffer(b"".join(self._records[first:]), dtype)
 
+    def forget(self) -> None:
+        """Keep no ticks but those to come."""
+        self._records.clear()
+
     def to(self, position_m: Array, seconds: float) -> np.ndarray:
         """Go to a position."""
         return self.run(seconds, PositionTarget(np.asarray(position_m, dtype=np.float64)))

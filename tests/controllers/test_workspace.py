@@ -194,9 +194,7 @@ def test_the_limits_are_those_that_the_lengths_at_the_nearest_point_touch(name: 
     limits = Limits(arm)
     for target in rng.uniform((-0.4, -0.4, -0.2), (0.4, 0.4, 0.4), (100, 3)):
         answer = WORKSPACES[name].is_reachable(target)
-        shape = WORKSPACES[name].region
-        assert isinstance(shape, SolvedRegion)
-        lengths = shape.lengths_m(answer.nearest_m)
+        lengths = WORKSPACES[name].lengths_m(answer.nearest_m)
         slack = min((lengths - region.lower_m).min(), (region.upper_m - lengths).min())
         travel = Binding.LENGTH | Binding.PRESSURE
         assert bool(answer.limits & travel) == (slack < AT_BOUND_M and not answer.reachable)

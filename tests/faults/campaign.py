@@ -20,7 +20,7 @@ from tests.faults.log_audit import audit_log
 from tests.faults.rig import Rig
 
 #: How long an arm has moved at most when the fault comes, s.
-_MOVES_S = 0.8
+_MOVES_S = 0.5
 
 _FAILED = (Exception, pytest.fail.Exception)
 
@@ -64,6 +64,10 @@ class FaultRun:
             self._fault.inject(rig, injection)
             if rig.alive:
                 rig.stop_and_reset(injection)
+        except KeyboardInterrupt:  # half an injection proves nothing
+            self.row.injections = [i for i in self.row.injections if i is not injection]
+            self._unaudited = [i for i in self._unaudited if i is not injection]
+            raise
         except _FAILED as error:
             if injection not in self.row.injections:
                 self.row.injections.append(injection)
@@ -119,7 +123,7 @@ class FaultRun:
         path = rig.log_path()
         audit_log(path, rig.offset_ns, arm, self._unaudited, rig.emulator is not None)
         if rig.emulator is not None:
-            audit_device(rig.emulator.record, arm, self._unaudited)
+            audit_device(rig.emulator.record, arm, self._unaudited, rig.emulator.jitter_s)
 
 
 def run_campaign(faults: list[Fault], times: int, seed: int) -> Iterator[Row]:

@@ -33,6 +33,7 @@ def _transport(words: Words) -> Callable[[Rig, Injection], None]:
         injection.begin()
         rig.emulator.inject(words(injection))
         rig.wait_for_mode(pb.FAULT)
+        rig.wait_until_empty()
         rig.emulator.inject("clear")
 
     return inject
@@ -46,7 +47,7 @@ def _broken_lines(words: Words) -> Callable[[Rig, Injection], None]:
         injection.begin()
         rig.emulator.inject(words(injection))
         rig.wait_until(enough(1.0), "broken lines")
-        injection.must_stay(pb.ACTIVE, pb.FAULT)
+        injection.must_stay(pb.ACTIVE, pb.HOLD, pb.FAULT)
         rig.emulator.inject("clear")
 
     return inject
@@ -62,6 +63,7 @@ def _cable_out(rig: Rig, injection: Injection) -> None:
     rig.emulator.inject(f"unplug {out_s:.3f}")
     rig.wait_for_mode(pb.FAULT)
     rig.wait_until(enough(out_s), "the cable")
+    rig.wait_until_empty()
 
 
 def _slow(rig: Rig, injection: Injection) -> None:
@@ -84,7 +86,7 @@ def _physical(words: Words, *modes: int, zeroed: bool = True) -> Callable[[Rig, 
         rig.emulator.inject(words(injection))
         rig.wait_for_mode(*modes)
         if zeroed:
-            rig.wait_until(lambda: rig.emulator_is_zeroed(), "zeros", _RAMPED_S)
+            rig.wait_until(rig.emulator.is_zeroed, "zeros", _RAMPED_S)
         rig.emulator.inject("clear")
 
     return inject
@@ -150,7 +152,7 @@ def _air(name: str, words: Words, policy: str = _RAMPED, *modes: int) -> Fault:
 
 
 def _serial(device: str) -> tuple[Fault, ...]:
-    lines = "goes on, or fault and zeros, latched"
+    lines = "goes on, holds, or fault and zeros, latched"
     garbage = _broken_lines(lambda injection: "garbage")
     half = _broken_lines(_for("half-lines", 0.2, 0.6))
     return (

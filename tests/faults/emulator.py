@@ -17,6 +17,12 @@ from tests.faults.program import Program
 #: Gauge pressure below which a chamber counts as empty, Pa.
 EMPTY_PA = 1000.0
 
+#: The newest setpoints are not farther from the end of a record than this.
+_LAST_BYTES = 1 << 18
+
+
+#: A serial line acknowledges no setpoint, and its emulator notes it when it comes to read it.
+_SERIAL_JITTER_S = 0.01
 
 #: Arms for devices that cannot move the default one: an ESP32's pump gives 0.13 bar.
 _ARMS: dict[str, dict[str, Any]] = {
@@ -48,13 +54,13 @@ class Emulator:
         own = _ARMS.get(what, {})
         arm = folder / f"{what}.toml"
         arm.write_text(tomli_w.dumps(own))
+        self.jitter_s = 0.0 if what.startswith("festo") else _SERIAL_JITTER_S
         self.record = Path(tempfile.mkstemp(".jsonl", "device-", folder)[1])
         self._program = Program(
             "pneuarm", "emulate", what, "--arm", str(arm), "--record", str(self.record)
         )
         self.tables = own | self._configuration()
-        with contextlib.suppress(OSError):  # it stands for another machine, which has nothing else
-            os.sched_setscheduler(self._program.process.pid, os.SCHED_FIFO, os.sched_param(70))
+        self._go_first()
 
     def _configuration(self) -> dict[str, dict[str, Any]]:
         """Read the lines that it prints, up to the last, which names the faults."""
@@ -63,6 +69,27 @@ class Emulator:
             lines.append(self._program.hear(""))
         tables: dict[str, Any] = tomllib.loads("\n".join(lines))
         return {name: table for name, table in tables.items() if isinstance(table, dict)}
+
+    def _go_first(self) -> None:
+        """It stands for another machine, which has nothing else to do: real time where granted."""
+        for task in Path(f"/proc/{self._program.process.pid}/task").iterdir():
+            with contextlib.suppress(OSError):
+                os.sched_setscheduler(int(task.name), os.SCHED_FIFO, os.sched_param(70))
+
+    def is_zeroed(self) -> bool:
+        """Whether its last setpoints are zeros."""
+        return not any(self._newest("setpoints_pa"))
+
+    def is_empty(self) -> bool:
+        """Whether there is no air in the chambers any more."""
+        return max(map(abs, self._newest("true_pa"))) < EMPTY_PA
+
+    def _newest(self, name: str) -> list[float]:
+        """Last whole line of the record that has this key, looked for in its last part."""
+        with self.record.open("rb") as file:
+            file.seek(max(0, self.record.stat().st_size - _LAST_BYTES))
+            lines = file.read().split(b"\n")[1:-1]
+        return next(json.loads(line)[name] for line in reversed(lines) if name.encode() in line)
 
     def inject(self, words: str) -> None:
         """Break something; returns once it is broken."""

@@ -54,6 +54,7 @@ def _device(number: int) -> Callable[[Rig, Injection], None]:
         os.kill(device, number)
         rig.wait_until(lambda: rig.pid("device") != device, "another device process")
         rig.wait_for_mode(pb.FAULT)
+        rig.wait_until_empty()
 
     return inject
 

@@ -105,8 +105,9 @@ def figures(row: Row) -> str:
     for name in names:
         values = [i.figures[name] for i in row.injections if name in i.figures]
         label, scale, unit = _label(name)
-        if unit == "":
+        if unit == "" and any(values):
             parts.append(f"{label} {sum(values):.0f} times of {len(values)}")
+        if unit == "":
             continue
         median, largest = statistics.median(values) * scale, max(values) * scale
         total = f", {sum(values):.0f} in all" if unit == " of them" else ""
