@@ -1,6 +1,7 @@
 """The command line. Units at the prompt are millimetres, degrees and bar."""
 
 import argparse
+import importlib
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,100 +19,11 @@ EMULATED = ("festo-cpx", "festo-vtem", "ctrl-p", "esp32")
 _ENDPOINT = "tcp/127.0.0.1:7447"
 
 
-def _run(arguments: argparse.Namespace) -> int:
-    from service.commands_daemon import run
-
-    return run(arguments)
-
-
-def _config(arguments: argparse.Namespace) -> int:
-    from service.commands_daemon import config
-
-    return config(arguments)
-
-
-def _demo(arguments: argparse.Namespace) -> int:
-    from service.demo import demo
-
-    return demo(arguments)
-
-
-def _emulate(arguments: argparse.Namespace) -> int:
-    from service.commands_emulate import emulate
-
-    return emulate(arguments)
-
-
-def _emulate_camera(arguments: argparse.Namespace) -> int:
-    from service.camera import emulate_camera
-
-    return emulate_camera(arguments)
-
-
-def _send(arguments: argparse.Namespace) -> int:
-    from service.commands_client import send
-
-    return send(arguments)
-
-
-def _mode(arguments: argparse.Namespace) -> int:
-    from service.commands_client import mode
-
-    return mode(arguments)
-
-
-def _estop(arguments: argparse.Namespace) -> int:
-    from service.commands_client import estop
-
-    return estop(arguments)
-
-
-def _state(arguments: argparse.Namespace) -> int:
-    from service.commands_client import state
-
-    return state(arguments)
-
-
-def _replay(arguments: argparse.Namespace) -> int:
-    from service.commands_logs import replay
-
-    return replay(arguments)
-
-
-def _info(arguments: argparse.Namespace) -> int:
-    from service.commands_logs import info
-
-    return info(arguments)
-
-
-def _validate(arguments: argparse.Namespace) -> int:
-    from service.commands_validate import validate
-
-    return validate(arguments)
-
-
-def _workspace(arguments: argparse.Namespace) -> int:
-    from service.commands_workspace import workspace
-
-    return workspace(arguments)
-
-
-def _doctor(arguments: argparse.Namespace) -> int:
-    from service.doctor.command import doctor
-
-    return doctor(arguments)
-
-
-def _systemd(arguments: argparse.Namespace) -> int:
-    from service.systemd.unit import systemd
-
-    return systemd(arguments)
-
-
-def _calibrate(arguments: argparse.Namespace) -> int:
-    from service.commands_calibrate import run
-
-    return run(arguments)
+def _call(where: str, arguments: argparse.Namespace) -> int:
+    """Call "module:function"; loaded only now, so that no command waits for the others' imports."""
+    module, _, name = where.partition(":")
+    function: Command = getattr(importlib.import_module(module), name)
+    return function(arguments)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -132,22 +44,37 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _command(
-    commands: Subparsers, name: str, function: Command, help_text: str
+    commands: Subparsers, name: str, where: str, help_text: str
 ) -> argparse.ArgumentParser:
     parser = commands.add_parser(name, help=help_text, description=help_text)
-    parser.set_defaults(function=function)
+    parser.set_defaults(where=where)
     return parser
 
 
 def _add_daemon(commands: Subparsers) -> None:
-    run = _command(commands, "run", _run, "Run the daemon until Ctrl-C; it ends with vented arm.")
-    config = _command(commands, "config", _config, "Show the effective configuration, or check.")
+    run = _command(
+        commands,
+        "run",
+        "service.commands_daemon:run",
+        "Run the daemon until Ctrl-C; it ends with vented arm.",
+    )
+    config = _command(
+        commands,
+        "config",
+        "service.commands_daemon:config",
+        "Show the effective configuration, or check.",
+    )
     config.add_argument("action", choices=("show", "check"))
     for parser in (run, config):
         parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
         parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
     run.add_argument("--viewer", action="store_true", help="open Rerun's window, with a display")
-    demo = _command(commands, "demo", _demo, "Daemon and client as processes: circle, eight, ...")
+    demo = _command(
+        commands,
+        "demo",
+        "service.demo:demo",
+        "Daemon and client as processes: circle, eight, ...",
+    )
     demo.add_argument("--seconds", type=float, default=30.0, help="length of the show (default 30)")
     demo.add_argument("--adapter", choices=("simulator", *EMULATED), default="simulator")
     demo.add_argument("--arm", choices=PRESETS, default="paper")
@@ -165,7 +92,12 @@ def _add_emulate(commands: Subparsers) -> None:
 
 
 def _add_emulated_device(devices: Subparsers, name: str) -> None:
-    device = _command(devices, name, _emulate, f"{name}, with the simulated arm behind it.")
+    device = _command(
+        devices,
+        name,
+        "service.commands_emulate:emulate",
+        f"{name}, with the simulated arm behind it.",
+    )
     device.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
     device.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
     device.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
@@ -176,7 +108,7 @@ def _add_emulated_device(devices: Subparsers, name: str) -> None:
 
 def _add_emulated_camera(devices: Subparsers) -> None:
     help_text = "Motion capture that sees the tip of a simulated arm."
-    camera = _command(devices, "camera", _emulate_camera, help_text)
+    camera = _command(devices, "camera", "service.camera:emulate_camera", help_text)
     camera.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
     camera.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
     camera.add_argument("--rate", type=float, default=100.0, help="poses a second (100)")
@@ -188,7 +120,10 @@ def _add_emulated_camera(devices: Subparsers) -> None:
 
 def _add_client(commands: Subparsers) -> None:
     send = _command(
-        commands, "send", _send, "Send a target until it is reached; then the arm holds."
+        commands,
+        "send",
+        "service.commands_client:send",
+        "Send a target until it is reached; then the arm holds.",
     )
     kinds = send.add_subparsers(dest="kind", required=True, metavar="KIND")
     position = kinds.add_parser("position", help="tip position in the base frame, mm")
@@ -228,12 +163,19 @@ def _add_client(commands: Subparsers) -> None:
         "reset": "Leave fault or estop, to idle.",
     }
     for name, text in helps.items():
-        parser = _command(commands, name, _mode, text)
+        parser = _command(commands, name, "service.commands_client:mode", text)
         _add_connection(parser)
         if name == "enable":
             parser.add_argument("--take-over", action="store_true")
-    _add_connection(_command(commands, "estop", _estop, "Stop: vent at once, and latch."))
-    state = _command(commands, "state", _state, "Show the newest state.")
+    _add_connection(
+        _command(
+            commands,
+            "estop",
+            "service.commands_client:estop",
+            "Stop: vent at once, and latch.",
+        )
+    )
+    state = _command(commands, "state", "service.commands_client:state", "Show the newest state.")
     state.add_argument("--follow", action="store_true", help="go on until Ctrl-C")
     _add_connection(state)
 
@@ -261,28 +203,43 @@ def _add_connection(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_logs(commands: Subparsers) -> None:
-    replay = _command(commands, "replay", _replay, "Show a recorded session again.")
+    replay = _command(
+        commands,
+        "replay",
+        "service.commands_logs:replay",
+        "Show a recorded session again.",
+    )
     replay.add_argument("log", type=Path)
     replay.add_argument("--speed", type=float, default=1.0)
     replay.add_argument("--loop", action="store_true")
     replay.add_argument("--to", choices=("rerun", "zenoh"), default="rerun")
     replay.add_argument("--listen", default=_ENDPOINT, help="where to listen, with --to zenoh")
     replay.add_argument("--port", type=int, default=9876, help="port of Rerun's server")
-    info = _command(commands, "info", _info, "Say what is in a recorded session.")
+    info = _command(
+        commands,
+        "info",
+        "service.commands_logs:info",
+        "Say what is in a recorded session.",
+    )
     info.add_argument("log", type=Path)
     info.add_argument("--json", action="store_true")
 
 
 def _add_validate(commands: Subparsers) -> None:
     help_text = "Compare the model with the paper's measurements."
-    validate = _command(commands, "validate", _validate, help_text)
+    validate = _command(commands, "validate", "service.commands_validate:validate", help_text)
     validate.add_argument("what", choices=("table1",))
     validate.add_argument("--table", type=Path, metavar="FILE.csv", help="another such table")
     validate.add_argument("--json", action="store_true", help="one JSON object instead")
 
 
 def _add_workspace(commands: Subparsers) -> None:
-    workspace = _command(commands, "workspace", _workspace, "Where the tip can be, and how well.")
+    workspace = _command(
+        commands,
+        "workspace",
+        "service.commands_workspace:workspace",
+        "Where the tip can be, and how well.",
+    )
     workspace.add_argument("--arm", choices=PRESETS, default="paper")
     workspace.add_argument("--out", type=Path, metavar="DIR", help="write picture, mesh, samples")
     workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
@@ -291,9 +248,19 @@ def _add_workspace(commands: Subparsers) -> None:
 
 
 def _add_machine(commands: Subparsers) -> None:
-    doctor = _command(commands, "doctor", _doctor, "Is this PC ready, and what must be changed.")
+    doctor = _command(
+        commands,
+        "doctor",
+        "service.doctor.command:doctor",
+        "Is this PC ready, and what must be changed.",
+    )
     doctor.add_argument("--json", action="store_true", help="one JSON object instead of text")
-    systemd = _command(commands, "systemd", _systemd, "Print a unit file: the daemon as a service.")
+    systemd = _command(
+        commands,
+        "systemd",
+        "service.systemd.unit:systemd",
+        "Print a unit file: the daemon as a service.",
+    )
     systemd.add_argument("--user", help="who runs it (default: you)")
     for parser in (doctor, systemd):
         parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
@@ -302,7 +269,7 @@ def _add_machine(commands: Subparsers) -> None:
 
 def _add_calibrate(commands: Subparsers) -> None:
     help_text = "Move the arm, fit the map between pressure and length, write a configuration."
-    calibrate = _command(commands, "calibrate", _calibrate, help_text)
+    calibrate = _command(commands, "calibrate", "service.commands_calibrate:run", help_text)
     _add_connection(calibrate)
     calibrate.set_defaults(arm=None)  # a log says by itself whose it is
     calibrate.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="(default: .)")
@@ -317,9 +284,8 @@ def _add_calibrate(commands: Subparsers) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; an error is one sentence on stderr and the exit status 1."""
     parsed = build_parser().parse_args(arguments)
-    function: Command = parsed.function
     try:
-        return function(parsed)
+        return _call(parsed.where, parsed)
     except PneuarmError as error:
         print(f"pneuarm: {error}", file=sys.stderr)
         return 1

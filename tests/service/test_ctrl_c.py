@@ -53,7 +53,7 @@ def test_ctrl_c_while_loading_says_nothing(module: str, arguments: list[str], st
 def test_later_it_is_the_commands_own_affair() -> None:
     """A module that a running command loads is no start: its cleaning up must come to its turn."""
     start = """
-from service import cli
+from service import commands_client
 def state(parsed):
     try:
         def own():
@@ -63,7 +63,7 @@ def state(parsed):
     finally:
         print("cleaned up")
 import types
-cli._state = types.FunctionType(state.__code__, {"__name__": "service.commands_client"})
+commands_client.state = types.FunctionType(state.__code__, {"__name__": "service.commands_client"})
 import pneuarm
 pneuarm.main()
 """
