@@ -16,6 +16,9 @@ from controllers.tasks.chamber_lengths import ChamberLengths
 
 __all__ = ["Binding", "Controller", "Reach"]
 
+#: Lengths this near to the goal of the way round (m) are there.
+AT_GOAL_M = 2e-5
+
 
 class Controller:
     """Holds the commanded lengths and moves them toward the target, inside every limit."""
@@ -44,8 +47,10 @@ class Controller:
             settings.stalled_rate_m_s,
             settings.stalled_time_s,
         )
+        # The way round is judged by the lengths: the tip may go away from its target first.
+        self._way = Progress(AT_GOAL_M, 0.0, settings.stalled_rate_m_s, settings.stalled_time_s)
         self._target: Target | None = None
-        self._moving = self._sends_pressures = False
+        self._awaited = self._sends_pressures = False
         self._offset_m, self._turn = np.zeros(3), np.eye(3)
         # Of the vented arm as it hangs, until it is started from something.
         vented = self._pressure_map.lengths_m(np.zeros((arm.n_sections, 3)))
@@ -94,14 +99,17 @@ class Controller:
             model.position_m + self._offset_m, self._turn @ model.rotation, model.jacobian
         )
 
-    def set_target(self, target: Target | None, moving: bool = False) -> None:
+    def set_target(
+        self, target: Target | None, moving: bool = False, awaited: bool = False
+    ) -> None:
         """Follow a new target from where the command stands now; None brakes and holds.
 
-        A target that is only on the way, ``moving``, is never reached nor out of reach.
+        A target that is only on the way, ``moving``, is never reached nor out of reach. While the
+        arm itself is still ``awaited`` there, the target is not reached by the command alone.
         """
         if moving or target is None or not _same(target, self._target):
             self._progress.start()
-        self._target, self._moving = target, moving
+        self._target, self._awaited = target, awaited
         self._detour.set_target(target, self._offset_m)
         if target is None:
             self.reach, self.error_m = Reach.NONE, 0.0
@@ -140,10 +148,27 @@ class Controller:
             self.reach = Reach.MOVING
             return
         self.error_m = error_m
-        self.reach = self._progress.judge(error_m, dt_s)
-        if self._detour.begins(error_m, dt_s) and self._detour.goal_m is not None:
-            self._motion.pursue(ChamberLengths(self._detour.goal_m))
+        if self._is_going_round(dt_s):
+            self.reach = Reach.MOVING
             self._progress.start()
+            return
+        self.reach = self._progress.judge(error_m, dt_s)
+        if self._awaited and self.reach == Reach.REACHED:
+            self.reach = Reach.MOVING
+        stalled = self.reach == Reach.OUT_OF_REACH
+        if self._detour.begins(error_m, dt_s, stalled) and self._detour.goal_m is not None:
+            self._motion.pursue(ChamberLengths(self._detour.goal_m))
+            self.reach = Reach.MOVING
+            self._progress.start()
+            self._way.start()
+
+    def _is_going_round(self, dt_s: float) -> bool:
+        """Whether the way round is taken, and its goal comes nearer still."""
+        goal = self._detour.goal_m
+        if not self._detour.taken or goal is None:
+            return False
+        left_m = max(map(abs, (goal - self.lengths_m).reshape(-1).tolist()))
+        return self._way.judge(left_m, dt_s) == Reach.MOVING
 
     def pressures_pa(self) -> Array:
         """Gauge pressures (n_sections, 3) of the commanded lengths, inside their limits.

@@ -46,7 +46,7 @@ class Detour:
 
     def set_target(self, target: Target | None, offset_m: Array) -> None:
         """Find the goal of a new target; ``offset_m`` (3,) is what is measured beside the model."""
-        if not self._possible or not isinstance(target, PositionTarget):
+        if not self._possible or not isinstance(target, PositionTarget) or _moves(target):
             self.goal_m, self._position_m, self.taken = None, None, False
             return
         before, self._position_m = self._position_m, target.position_m
@@ -77,12 +77,21 @@ class Detour:
         inside = self._low_m <= min(lengths) and max(lengths) <= self._high_m
         return np.array([lengths]) if inside else None
 
-    def begins(self, error_m: float, dt_s: float) -> bool:
-        """Say whether to begin the detour now, with this error of the tip."""
+    def begins(self, error_m: float, dt_s: float, stalled: bool) -> bool:
+        """Say whether to begin the detour now, with this error of the tip.
+
+        ``stalled`` says that the tip comes nearer too slowly to wait for it.
+        """
         if self.goal_m is None or self.taken:
             return False
         self._stuck_s += dt_s
         if self._best_m - error_m >= _LEAST_M or self._best_m == math.inf:
             self._best_m, self._stuck_s = error_m, 0.0
-        self.taken = self._stuck_s >= _PATIENCE_S and error_m > self._goal_error_m + _BETTER_M
+        stuck = stalled or self._stuck_s >= _PATIENCE_S
+        self.taken = stuck and error_m > self._goal_error_m + _BETTER_M
         return self.taken
+
+
+def _moves(target: PositionTarget) -> bool:
+    """A position on its way is followed with its velocity, which a detour knows nothing of."""
+    return target.velocity_m_s is not None and any(target.velocity_m_s.tolist())

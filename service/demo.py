@@ -21,7 +21,7 @@ from controllers.errors import DaemonUnreachable, InvalidInput, PneuarmError
 from service.client import Client
 from service.config import Configuration, check, load
 from service.demo_device import emulated
-from service.demo_figures import Drawn, Figures, evaluate, table
+from service.demo_figures import Drawn, evaluate, table
 from service.demo_parts import Part, parts, tables
 from service.demo_screen import Screen
 
@@ -134,6 +134,3 @@ def _run_client(part: Part, nominal: Configuration, endpoint: str) -> dict[str, 
         raise PneuarmError("the demo's client failed; see its lines above")
     phases: dict[str, list[int]] = json.loads(client.stdout)
     return phases
-
-
-__all__ = ["Figures", "demo"]

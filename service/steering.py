@@ -126,8 +126,8 @@ class Steering:
         self._corrected()
         wanted = self._follower.step(dt_s) if dt_s > 0.0 else None
         if wanted is not None:
-            waits = self.observer.seen and self._feedback.enabled and not self._near
-            self._controller.set_target(wanted, moving=waits or not self._follower.arrived)
+            awaited = self.observer.seen and self._feedback.enabled and not self._near
+            self._controller.set_target(wanted, not self._follower.arrived, awaited)
         self.tip_m = self._controller.step(dt_s).position_m
         return self._controller.pressures_pa()
 

@@ -4,20 +4,19 @@ from collections import deque
 
 import numpy as np
 
-from controllers.arm import Arm, Array
+from controllers.arm import Array
 from controllers.feedback import FeedbackSettings
 from controllers.shapes import Shape
 from controllers.targets import CircleTarget, PositionTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation
 from controllers.trajectory import ReferenceLimits
-from hardware.interface import Measurement
-from hardware.simulator.adapter import SimulatedArm
-from hardware.simulator.parameters import SimulatorParameters
+from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
 from logs.tick import tick_dtype
+from service import backends
 from service.commands import Command, Heartbeat, RequestMode, SetTarget, SetTipPose
-from service.config import load
+from service.config import Configuration
 from service.loop import Loop, LoopSettings, Timing
 from service.mode import Mode, ModeEvent
 from service.mode_keeper import Timeouts
@@ -27,12 +26,12 @@ _TIMEOUTS = Timeouts(target_s=0.2, arming_s=30.0, hold_s=60.0, full_disk_vent_s=
 
 
 class Seen:
-    """The simulated arm, whose newest true tip the camera looks at."""
+    """A simulated arm, whose newest true tip the camera looks at."""
 
     has_watchdog = True
 
-    def __init__(self, arm: Arm, seed: int) -> None:
-        self.device = SimulatedArm(arm, SimulatorParameters(), seed)
+    def __init__(self, device: Hardware) -> None:
+        self.device = device
         self.tip: tuple[Array, Array] | None = None
 
     def connect(self) -> None:
@@ -54,7 +53,7 @@ class Seen:
 
 
 class Rig:
-    """Daemon's loop, arm and camera; one tick is one period.
+    """Daemon's loop, arm and camera; one tick is one period of the configuration.
 
     The camera takes ``camera_hz`` poses a second, which arrive ``delay_s`` later, with
     ``noise_m`` on every axis. ``camera`` switches it.
@@ -62,11 +61,8 @@ class Rig:
 
     def __init__(
         self,
-        seed: int,
-        arm: Arm | None = None,
+        configuration: Configuration,
         *,
-        preset: str = "paper",
-        rate_hz: float = 500.0,
         feedback: FeedbackSettings | None = None,
         reference: ReferenceLimits | None = None,
         camera: bool = True,
@@ -74,20 +70,20 @@ class Rig:
         delay_s: float = 0.01,
         noise_m: float = 1e-4,
     ) -> None:
-        configuration = load(preset=preset)
-        true_arm = configuration.build_arm()
-        self.arm = arm or true_arm
+        self.arm = configuration.build_arm()
+        rate_hz = configuration.control.rate_hz
         self.period_ns = round(1e9 / rate_hz)
-        self.hardware = Seen(true_arm, seed)
+        self.hardware = Seen(backends.build(configuration, self.arm))
         self.events: list[pb.Event] = []
         settings = LoopSettings(
             period_s=1.0 / rate_hz,
             control=configuration.control.settings(),
             timeouts=_TIMEOUTS,
+            monitors=configuration.monitors.settings(),
             start_ns=_START_NS,
             start_unix_ns=_START_NS,
-            reference=reference or ReferenceLimits(),
-            feedback=feedback or FeedbackSettings(),
+            reference=reference or configuration.reference.limits(),
+            feedback=feedback or configuration.feedback.settings(),
         )
         self.hardware.connect()
         self.loop = Loop(self.arm, settings, self.hardware, self.events.append)
@@ -97,7 +93,7 @@ class Rig:
         self.camera = camera
         self._camera_ns, self._next_ns = round(1e9 / camera_hz), self.now_ns
         self._delay_ns, self._noise_m = round(delay_s * 1e9), noise_m
-        self._rng = np.random.default_rng([seed, 7])
+        self._rng = np.random.default_rng([configuration.simulator.seed, 7])
         self._on_the_way: deque[tuple[int, Array, Array]] = deque()
         self._records: list[bytes] = []
         self._target: Target | None = None

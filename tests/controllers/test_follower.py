@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.follower import Follower, Lead, _spin
-from controllers.frames import rotation_from_vector
+from controllers.frames import rotation_from_vector, rotation_vector
 from controllers.kinematics.compiled import TipState
 from controllers.shapes import Circle
 from controllers.targets import CircleTarget, PoseTarget, PositionTarget, Target
-from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_vector
+from controllers.tasks.tip_pose import quaternion_from_rotation
 from controllers.trajectory import ReferenceLimits
 
 LIMITS = ReferenceLimits(0.5, 4.0, 80.0)

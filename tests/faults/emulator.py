@@ -6,6 +6,7 @@ import os
 import tempfile
 import tomllib
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -24,34 +25,30 @@ _LAST_BYTES = 1 << 18
 #: A serial line acknowledges no setpoint, and its emulator notes it when it comes to read it.
 _SERIAL_JITTER_S = 0.01
 
-#: Arms for devices that cannot move the default one: an ESP32's pump gives 0.13 bar.
-_ARMS: dict[str, dict[str, Any]] = {
+#: What a device that cannot move the default arm needs of it: an ESP32's pump gives 0.13 bar.
+_SECTIONS: dict[str, dict[str, float]] = {
     "esp32": {
-        "arm": {
-            "sections": [
-                {
-                    "rest_length_mm": 200.0,
-                    "chamber_offset_mm": 38.0,
-                    "length_min_mm": 100.0,
-                    "length_max_mm": 300.0,
-                    "bend_max_deg": 150.0,
-                    "length_rate_max_mm_s": 200.0,
-                    "pressure_min_bar": 0.0,
-                    "pressure_max_bar": 0.12,
-                    "pressure_slew_max_bar_s": 0.6,
-                    "lengthening_mm_per_bar": 800.0,
-                }
-            ]
-        }
+        "pressure_min_bar": 0.0,
+        "pressure_max_bar": 0.12,
+        "pressure_slew_max_bar_s": 0.6,
+        "lengthening_mm_per_bar": 800.0,
     }
 }
+
+
+def _own_arm(what: str) -> dict[str, Any]:
+    """Tables of an arm that the device can move, empty for the default one."""
+    if what not in _SECTIONS:
+        return {}
+    preset = tomllib.loads(files("service").joinpath("presets", "paper.toml").read_text())
+    return {"arm": {"sections": [preset["arm"]["sections"][0] | _SECTIONS[what]]}}
 
 
 class Emulator:
     """`pneuarm emulate WHAT`, with the tables that make a daemon use it."""
 
     def __init__(self, what: str, folder: Path) -> None:
-        own = _ARMS.get(what, {})
+        own = _own_arm(what)
         arm = folder / f"{what}.toml"
         arm.write_text(tomli_w.dumps(own))
         self.jitter_s = 0.0 if what.startswith("festo") else _SERIAL_JITTER_S

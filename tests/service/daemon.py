@@ -59,8 +59,7 @@ def run_command(*arguments: str, **options: Any) -> "subprocess.CompletedProcess
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=45,
-        **options,
+        **({"timeout": 45} | options),
     )
 
 

@@ -7,6 +7,7 @@ from controllers.estimator import EstimateSource
 from controllers.shapes import Circle
 from controllers.targets import LengthsTarget
 from tests.bench.rig import Rig
+from tests.service.simulated import configuration_of
 
 HOME = np.array([0.0, 0.0, 0.2])
 CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
@@ -14,7 +15,7 @@ CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
 
 @pytest.fixture(scope="module")
 def rig() -> Rig:
-    rig = Rig(1).activate()
+    rig = Rig(configuration_of(seed=1)).activate()
     rig.to(HOME, 4.0)
     return rig
 
