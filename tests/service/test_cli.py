@@ -9,7 +9,6 @@ import pytest
 
 from controllers.errors import LeaseRefused
 from logs.schema import pneuarm_pb2 as pb
-from service import cli
 from service.cli import build_parser, main
 from service.commands_client import target_of
 from service.config import load
@@ -19,34 +18,49 @@ CONNECTION = ["--arm", "trunk", "--connect", "tcp/127.0.0.1:9", "--zenoh-config"
 POSE = ["1", "2", "3", "0", "0", "0", "1"]
 
 COMMANDS = [
-    ("_run", ["run"]),
-    ("_run", ["run", "own.toml", "--viewer"]),
-    ("_run", ["run", "--arm", "trunk"]),
-    ("_demo", ["demo"]),
-    ("_demo", ["demo", "--seconds", "3", "--arm", "table1", "--seed", "4", "--json"]),
-    ("_send", ["send", "position", "-40", "0.5", "-.5"]),
-    ("_send", ["send", "position", "40", "0", "200", "--enable", "--take-over", *CONNECTION]),
-    ("_send", ["send", "position", "4", "0", "2", "--law", "resolved_rate", "--timeout", "3"]),
-    ("_send", ["send", "pose", *POSE]),
-    ("_send", ["send", "twist", "1", "2", "3"]),
-    ("_send", ["send", "twist", "1", "2", "-3", "--angular", "1", "2", "-3", "--frame", "tip"]),
-    ("_send", ["send", "twist", "1", "2", "3", "--point", "base", "--seconds", "2"]),
-    ("_send", ["send", "lengths", "200", "210", "190"]),
-    ("_send", ["send", "pressures", "-0.5", "0", "0.5", "--enable"]),
-    ("_mode", ["enable", "--take-over", *CONNECTION]),
-    ("_mode", ["hold", *CONNECTION]),
-    ("_mode", ["vent"]),
-    ("_mode", ["reset"]),
-    ("_estop", ["estop", *CONNECTION]),
-    ("_state", ["state", "--follow", *CONNECTION]),
-    ("_replay", ["replay", "x.mcap", "--speed", "2", "--loop", "--to", "zenoh", "--port", "99"]),
-    ("_info", ["info", "x.mcap", "--json"]),
-    ("_config", ["config", "show"]),
-    ("_config", ["config", "check", "own.toml"]),
-    ("_doctor", ["doctor"]),
-    ("_doctor", ["doctor", "own.toml", "--json"]),
-    ("_systemd", ["systemd", "own.toml", "--user", "ada"]),
-    ("_systemd", ["systemd", "--arm", "trunk"]),
+    ("service.commands_daemon.run", ["run"]),
+    ("service.commands_daemon.run", ["run", "own.toml", "--viewer"]),
+    ("service.commands_daemon.run", ["run", "--arm", "trunk"]),
+    ("service.demo.demo", ["demo"]),
+    ("service.demo.demo", ["demo", "--seconds", "3", "--arm", "table1", "--seed", "4", "--json"]),
+    ("service.commands_client.send", ["send", "position", "-40", "0.5", "-.5"]),
+    (
+        "service.commands_client.send",
+        ["send", "position", "40", "0", "200", "--enable", "--take-over", *CONNECTION],
+    ),
+    (
+        "service.commands_client.send",
+        ["send", "position", "4", "0", "2", "--law", "resolved_rate", "--timeout", "3"],
+    ),
+    ("service.commands_client.send", ["send", "pose", *POSE]),
+    ("service.commands_client.send", ["send", "twist", "1", "2", "3"]),
+    (
+        "service.commands_client.send",
+        ["send", "twist", "1", "2", "-3", "--angular", "1", "2", "-3", "--frame", "tip"],
+    ),
+    (
+        "service.commands_client.send",
+        ["send", "twist", "1", "2", "3", "--point", "base", "--seconds", "2"],
+    ),
+    ("service.commands_client.send", ["send", "lengths", "200", "210", "190"]),
+    ("service.commands_client.send", ["send", "pressures", "-0.5", "0", "0.5", "--enable"]),
+    ("service.commands_client.mode", ["enable", "--take-over", *CONNECTION]),
+    ("service.commands_client.mode", ["hold", *CONNECTION]),
+    ("service.commands_client.mode", ["vent"]),
+    ("service.commands_client.mode", ["reset"]),
+    ("service.commands_client.estop", ["estop", *CONNECTION]),
+    ("service.commands_client.state", ["state", "--follow", *CONNECTION]),
+    (
+        "service.commands_logs.replay",
+        ["replay", "x.mcap", "--speed", "2", "--loop", "--to", "zenoh", "--port", "99"],
+    ),
+    ("service.commands_logs.info", ["info", "x.mcap", "--json"]),
+    ("service.commands_daemon.config", ["config", "show"]),
+    ("service.commands_daemon.config", ["config", "check", "own.toml"]),
+    ("service.doctor.command.doctor", ["doctor"]),
+    ("service.doctor.command.doctor", ["doctor", "own.toml", "--json"]),
+    ("service.systemd.unit.systemd", ["systemd", "own.toml", "--user", "ada"]),
+    ("service.systemd.unit.systemd", ["systemd", "--arm", "trunk"]),
 ]
 
 
@@ -60,7 +74,7 @@ def test_every_command_parses_and_runs_its_function(
         called.append(parsed)
         return 7
 
-    monkeypatch.setattr(cli, function, run)
+    monkeypatch.setattr(function, run)
     assert main(arguments) == 7
     assert called[0].command == arguments[0]
 
@@ -124,7 +138,7 @@ def test_an_error_is_one_sentence_and_a_status(
     def fail(parsed: argparse.Namespace) -> int:
         raise error
 
-    monkeypatch.setattr(cli, "_state", fail)
+    monkeypatch.setattr("service.commands_client.state", fail)
     assert main(["state"]) == status
     assert capsys.readouterr() == ("", said)
 
