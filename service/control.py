@@ -3,6 +3,7 @@
 It imports neither zenoh, rerun nor mcap, and waits for nobody but the clock.
 """
 
+import os
 import socket
 import time
 from multiprocessing.connection import Connection
@@ -167,3 +168,4 @@ def main(
     """
     ignore_terminal_signals()
     ControlProcess(shared, supervisor, requests, stream).run()
+    os._exit(0)  # frozen garbage is never collected, and libraries would complain of that
