@@ -10,7 +10,7 @@ from logs.topics import EVENT
 from service import backends
 from service.config import rerun_url
 from service.network import is_loopback
-from service.process import Shared
+from service.process import REALTIME, START_FAILED, Shared
 
 #: Lines a second; a flood of bad messages must not become a flood of lines.
 _LINES_PER_S = 10
@@ -57,7 +57,7 @@ class Announcer:
         for topic, payload, _ in self._reader.read():
             if topic is EVENT:
                 event = pb.Event.FromString(payload)
-                if event.code != "realtime":  # that was said among the facts of the start
+                if event.code not in (REALTIME, START_FAILED):
                     self._event(event)
 
     def _event(self, event: pb.Event) -> None:

@@ -3,10 +3,12 @@
 It imports neither zenoh, rerun nor mcap, and waits for nobody but the clock.
 """
 
+import os
 import socket
 import time
 from multiprocessing.connection import Connection
 
+from controllers.errors import HardwareError
 from hardware.interface import Hardware
 from logs.ring import RingWriter
 from logs.rings import MessageWriter
@@ -18,7 +20,7 @@ from service.commands import Command, ModeReply, Pipe, Shutdown
 from service.device_link import LinkedDevice
 from service.loop import Loop, LoopSettings, Timing
 from service.mode_keeper import Timeouts
-from service.process import Shared, ignore_terminal_signals
+from service.process import REALTIME, START_FAILED, Shared, ignore_terminal_signals
 
 #: How long the loop goes on venting after it was told to end, at most.
 VENT_BEFORE_END_S = 2.0
@@ -71,8 +73,7 @@ class ControlProcess:
         self._hardware.connect()
         try:
             granted = realtime.take_priority(control.priority)
-            self._loop.start_at(time.monotonic_ns())
-            self._loop.warm_up()
+            self._prepare()
             locked = realtime.lock_memory()
             realtime.freeze_garbage()
             self._report(granted, locked)
@@ -80,6 +81,15 @@ class ControlProcess:
         finally:
             self._hardware.vent(time.monotonic_ns() * 1e-9)
             self._hardware.close()
+
+    def _prepare(self) -> None:
+        """Warm up; raises SystemExit where the device fails: the supervisor ends the start then."""
+        try:
+            self._loop.start_at(time.monotonic_ns())
+            self._loop.warm_up()
+        except HardwareError as error:
+            self._loop.announce(pb.ERROR, START_FAILED, str(error))
+            raise SystemExit(1) from error
 
     def _cycle(self, clock: Clock) -> None:
         timing, overruns, compute_s = Timing(), 0, 0.0
@@ -138,7 +148,7 @@ class ControlProcess:
         memory = "memory locked" if locked else "memory not locked"
         self._loop.start_at(time.monotonic_ns())
         self._loop.announce(
-            pb.INFO if granted else pb.WARNING, "realtime", f"real-time {text}, {memory}"
+            pb.INFO if granted else pb.WARNING, REALTIME, f"real-time {text}, {memory}"
         )
 
 
@@ -158,3 +168,4 @@ def main(
     """
     ignore_terminal_signals()
     ControlProcess(shared, supervisor, requests, stream).run()
+    os._exit(0)  # frozen garbage is never collected, and libraries would complain of that

@@ -14,6 +14,9 @@ from service.config import Configuration
 from service.device_link import DeviceLink
 from service.usage import ProcessTable
 
+#: Codes of what control says of its start; the supervisor passes it on in its own words.
+REALTIME, START_FAILED = "realtime", "start_failed"
+
 #: Ctrl-C, the order to end, and a terminal that was closed.
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

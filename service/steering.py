@@ -138,10 +138,10 @@ class Steering:
     def _dither_pa(self, now_s: float) -> float:
         """What is added to every setpoint.
 
-        Only a followed target whose tip is measured needs it; a camera lost on the way changes
-        nothing.
+        Only a reference that is followed with the tip measured needs it: pressures and lengths are
+        sent as they are asked for. A camera lost on the way changes nothing.
         """
-        if self._target is None:
+        if not self._follower.follows:
             self._dither_since_s = None
             self._share = 1.0
             self._controller.set_hysteresis_share(1.0)

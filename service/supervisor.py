@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from multiprocessing import get_context
 
-from controllers.errors import ConfigurationError
+from controllers.errors import ConfigurationError, HardwareError
 from logs.ring import RingReader
 from logs.rings import MessageReader, MessageWriter, Rings
 from logs.schema import pneuarm_pb2 as pb
@@ -30,7 +30,7 @@ from service.local_stop import lock
 from service.mode import ModeEvent
 from service.network import check_free, read_config
 from service.notify import ServiceManager
-from service.process import ENDING_SIGNALS, Shared
+from service.process import ENDING_SIGNALS, REALTIME, START_FAILED, Shared
 from service.repairing import start_mending
 from service.usage import ProcessTable
 
@@ -161,7 +161,10 @@ class Supervisor:
         self._ending = True
 
     def _start_control(self) -> None:
-        """Start control alone, so that nothing delays its first tick, and wait for that."""
+        """Start control alone, so that nothing delays its first tick, and wait for that.
+
+        Raises HardwareError where it ends before.
+        """
         shared, locks = self._shared, (self._arm_lock, self._device_lock)
         control = self._add(
             "control", (shared, self._control_end, self._requests[1], self._stream[1], *locks)
@@ -171,14 +174,22 @@ class Supervisor:
             if time.monotonic() > give_up_s:
                 break
             time.sleep(0.005)
+        if not self._ending and not control.is_alive():
+            cause = self._said(START_FAILED) or "see the lines above"
+            raise HardwareError(f"the control process ended at its start: {cause}")
 
     def _realtime_fact(self) -> str:
         """Return what control has said of its priority, as the first thing it says."""
+        text = self._said(REALTIME)
+        return text.removeprefix("real-time ") if text else "control has not started"
+
+    def _said(self, code: str) -> str:
+        """Text of what control has said under a code, empty if nothing."""
         for _, payload, _ in MessageReader((self._shared.rings.control,)).read():
             event = pb.Event.FromString(payload)
-            if event.code == "realtime":
-                return event.text.removeprefix("real-time ")
-        return "control has not started"
+            if event.code == code:
+                return event.text
+        return ""
 
     def _start_others(self) -> None:
         shared = self._shared

@@ -5,8 +5,8 @@ from tests.bench.reach import acceptance, out_of_reach, reachable
 
 
 def test_reachable_positions_are_reached_within_a_tenth_of_a_millimetre() -> None:
-    found = reachable(paper_arm(), 60, seed=30)
-    assert (found["reached"], found["violations"], found["fallbacks"]) == (60, 0, 0)
+    found = reachable(paper_arm(), 40, seed=30)
+    assert (found["reached"], found["violations"], found["fallbacks"]) == (40, 0, 0)
 
 
 def test_from_and_to_the_straight_arm() -> None:
@@ -21,7 +21,7 @@ def test_the_nearest_point_of_a_position_out_of_reach_is_the_global_one() -> Non
 
 def test_osqp_gives_a_usable_result_with_every_limit_active() -> None:
     for arm in (paper_arm(), trunk_arm()):
-        found = acceptance(arm, 600, seed=33)
+        found = acceptance(arm, 300, seed=33)
         assert found["accepted"] == 1.0
         assert found["violations"] == 0
         assert {"keep_out", "slew", "acceleration"} <= set(found["touched"])

@@ -49,7 +49,7 @@ def test_from_exactly_straight_every_direction_is_open(
 ) -> None:
     arm = make()
     rng = np.random.default_rng(11)
-    for _ in range(6):
+    for _ in range(3):
         controller = starting_at(arm, arm.rest_lengths_m)
         run(arm, controller, position_of(arm, random_lengths(arm, rng, 0.8), law))
         assert controller.reach == Reach.REACHED

@@ -48,14 +48,14 @@ def test_the_tip_comes_to_rest_before_far_targets_in_any_direction(arm: Arm, law
         pytest.skip("along several limits at once the damped law creeps: the QP is for that")
     rng = np.random.default_rng(1)
     rested = 0
-    for _ in range(10):
+    for _ in range(5):
         controller = starting_at(arm, random_lengths(arm, rng))
         direction = rng.standard_normal(3)
         far = 1.2 * arm.max_length_m * direction / np.linalg.norm(direction)
         run(arm, controller, PositionTarget(far, law))
         rested += controller.reach == Reach.OUT_OF_REACH
         assert controller.binding() != Binding.NOTHING
-    assert rested >= 9  # a sideways drift of less than the tip speed may go on
+    assert rested >= 4  # a sideways drift of less than the tip speed may go on
 
 
 def test_a_pose_that_one_section_cannot_have_is_out_of_reach_without_any_limit() -> None:

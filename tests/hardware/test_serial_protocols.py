@@ -58,7 +58,7 @@ def assert_no_surprise(line: bytes) -> None:
     assert heard is None or isinstance(heard, Feedback | Remark)
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=500, deadline=None)
 @given(LINES)
 @example(b'{"pressure_1":' + b"9" * 5000 + b"}")
 @example(b"[" * 100_000)

@@ -34,7 +34,7 @@ def test_weightless_tip_settles_near_constant_curvature(seed: int) -> None:
     assert 3e-3 < np.linalg.norm(settled - ideal) < 40e-3
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=8, deadline=None, derandomize=True)
 @given(
     seed=st.integers(0, 1000),
     period_s=st.sampled_from([1e-3, 2e-3, 5e-3, 0.05]),
@@ -62,7 +62,7 @@ def test_any_pressures_leave_it_finite(
         np.testing.assert_allclose(np.linalg.det(reading.true_tip[1]), 1.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_twenty_seconds_of_random_slams_leave_it_finite(seed: int) -> None:
     """Every chamber at one end or the other, changed at random times."""
     simulated, rng = connected(seed=seed), np.random.default_rng(seed)

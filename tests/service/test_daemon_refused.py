@@ -1,5 +1,6 @@
 """What the daemon refuses at its start: one sentence, status 1, and nothing was touched."""
 
+import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 import tomli_w
 
-from tests.service.daemon import Daemon, assert_one_sentence, free_port, run_command
+from tests.service.daemon import ROOT, Daemon, assert_one_sentence, free_port, run_command
 
 Tables = dict[str, dict[str, Any]]
 
@@ -122,6 +123,28 @@ def test_same_device_under_another_name(tmp_path: Path, daemon: Daemon) -> None:
         {"hardware": {"device": device}},
         f"device 'simulator:{device}' is in use by another pneuarm daemon (process {daemon.pid})",
     )
+
+
+_BROKEN = """
+from controllers.errors import HardwareError
+from hardware.simulator.adapter import SimulatedArm
+
+def read(self, time_s):
+    raise HardwareError("the cable is out")
+
+SimulatedArm.read = read
+"""
+
+
+def test_device_that_fails_before_the_first_tick(tmp_path: Path) -> None:
+    hook = tmp_path / "hook"
+    hook.mkdir()
+    (hook / "sitecustomize.py").write_text(_BROKEN)  # every Python imports it at its start
+    environment = os.environ | {"PYTHONPATH": f"{hook}:{ROOT}"}
+    daemon = Daemon(tmp_path)
+    done = run_command("run", str(daemon.config), env=environment)
+    assert_one_sentence(done, "control process ended at its start: the cable is out")
+    assert list(daemon.logs.iterdir()) == []  # nothing else was started
 
 
 def test_zenoh_port_that_is_taken(tmp_path: Path, taken_port: int) -> None:
