@@ -13,7 +13,7 @@ from controllers.estimator import TipEstimate
 from controllers.feedback import FeedbackSettings, TipObserver, Verdict
 from controllers.follower import Follower, lead_of
 from controllers.kinematics.compiled import TipState
-from controllers.targets import PoseTarget, PositionTarget, ShapeTarget, Target
+from controllers.targets import PoseTarget, PositionTarget, PressuresTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
 from controllers.valve_lead import ValveLead
@@ -24,8 +24,9 @@ Tell = Callable[["pb.Level", str, str, str, str], None]
 
 _NONE = np.full(3, np.nan)
 
-#: The dither grows from nothing, and a share of the hysteresis from 0 to 1, in this time (s).
-_DITHER_RAMP_S = 0.3
+#: The dither grows from nothing, and a share of the hysteresis or the lead from 0 to 1, in this
+#: time (s).
+_RAMP_S = 0.3
 
 #: A reference faster than this (m/s) moves the arm through its hysteresis by itself.
 _MOVING_M_S = 0.005
@@ -59,7 +60,7 @@ class Steering:
         self._seen = self._refusing = False
         self._told_error = ""
         self._near = False
-        self._share = 1.0
+        self._share = self._lead_share = 1.0
         self._dither_since_s: float | None = None
         self._dt_s = period_s
 
@@ -132,8 +133,16 @@ class Steering:
         return self._controller.pressures_pa()
 
     def sent_pa(self, wanted_pa: Array, dt_s: float, now_s: float) -> Array:
-        """Setpoints for the valves, ahead of the wanted pressures, with the dither."""
-        return self._valves.sent_pa(wanted_pa, dt_s) + self._dither_pa(now_s)
+        """Setpoints for the valves, ahead of the wanted pressures, with the dither.
+
+        Pressures that are asked for are sent as they are: a lead that overshoots in the end would
+        cross the play that a calibration wants to see.
+        """
+        wanted = 0.0 if isinstance(self._target, PressuresTarget) else 1.0
+        largest = dt_s / _RAMP_S
+        self._lead_share += min(max(wanted - self._lead_share, -largest), largest)
+        ahead_pa = self._valves.sent_pa(wanted_pa, dt_s) - wanted_pa
+        return wanted_pa + (self._lead_share * ahead_pa + self._dither_pa(now_s))
 
     def _dither_pa(self, now_s: float) -> float:
         """What is added to every setpoint.
@@ -150,7 +159,7 @@ class Steering:
             if not (self.observer.seen and self._feedback.enabled):
                 return 0.0
             self._dither_since_s = now_s
-        share = min(1.0, (now_s - self._dither_since_s) / _DITHER_RAMP_S)
+        share = min(1.0, (now_s - self._dither_since_s) / _RAMP_S)
         self._follow_share()
         return share * self._dither.at_pa(now_s)
 
@@ -159,7 +168,7 @@ class Steering:
         motion, feedback = self._follower.motion, self._feedback
         moving = motion is not None and max(map(abs, motion.velocity[:3])) > _MOVING_M_S
         wanted = feedback.hysteresis_share_moving if moving else feedback.hysteresis_share
-        largest = self._dt_s / _DITHER_RAMP_S
+        largest = self._dt_s / _RAMP_S
         self._share += min(max(wanted - self._share, -largest), largest)
         self._controller.set_hysteresis_share(self._share)
 
