@@ -46,8 +46,11 @@ def demo(arguments: argparse.Namespace) -> int:
 
 
 def _laid_over(arguments: argparse.Namespace, device: dict[str, object]) -> dict[str, object]:
-    nominal = load(preset=arguments.arm).model_dump(exclude_none=True)
-    return nominal | device | tables(arguments.seed)
+    laid = load(preset=arguments.arm).model_dump(exclude_none=True)
+    for above in (device, tables(arguments.seed)):
+        for name, value in above.items():
+            laid[name] = laid[name] | value if isinstance(value, dict) else value
+    return laid
 
 
 def _play(

@@ -10,23 +10,27 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from controllers.actuation import length_bounds_m
 from controllers.arm import Arm
-from controllers.errors import DaemonUnreachable
+from controllers.errors import DaemonUnreachable, ModeRefused, TargetRejected
 from logs.schema import pneuarm_pb2 as pb
 from service.client import Client
 from service.config import check
 
 _RATE_HZ = 100.0
 _CAMERA_S = 10.0
+_TRIES = 4
 _TURN_S = 4.0
 
 #: Step of time (s) for the velocity along a path.
 _STEP_S = 1e-4
 
+T = TypeVar("T")
 Path = Callable[[float], tuple[float, float, float]]
 
 
@@ -76,13 +80,29 @@ def perform(
     phases = {}
     for name, path in (("circle", circle), ("eight", eight)):
         if name in seconds:
-            phases[name] = _draw(client, path, seconds[name], f"{label}: {name}")
+            draw = partial(_draw, client, path, seconds[name], f"{label}: {name}")
+            phases[name] = _persist(client, draw)
     if "out of reach" in seconds:
         _progress(f"{label}: out of reach", 0.5)
-        client.move_to((1.5 * height, 0.0, 0.5 * height))
+        _persist(client, partial(client.move_to, (1.5 * height, 0.0, 0.5 * height)))
     _progress(f"{label}: home", 0.9)
-    client.move_to((0.0, 0.0, height))
+    _persist(client, partial(client.move_to, (0.0, 0.0, height)))
     return phases
+
+
+def _persist(client: Client, act: Callable[[], T]) -> T:
+    """Do something; where a busy machine made the arm hold, arm again and do it anew.
+
+    Nobody stands beside the arm of a show; a program that moves a real one must ask first.
+    """
+    for _ in range(_TRIES):
+        try:
+            return act()
+        except (ModeRefused, TargetRejected) as error:
+            print(f"\ninterrupted ({error}); once more", file=sys.stderr)
+            client.enable()
+            client.events()
+    return act()
 
 
 def _wait_for_camera(client: Client) -> None:
