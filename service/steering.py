@@ -13,7 +13,7 @@ from controllers.estimator import TipEstimate
 from controllers.feedback import FeedbackSettings, TipObserver, Verdict
 from controllers.follower import Follower, lead_of
 from controllers.kinematics.compiled import TipState
-from controllers.targets import PoseTarget, PositionTarget, ShapeTarget, Target
+from controllers.targets import PoseTarget, PositionTarget, PressuresTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
 from controllers.valve_lead import ValveLead
@@ -128,14 +128,20 @@ class Steering:
         return self._controller.pressures_pa()
 
     def sent_pa(self, wanted_pa: Array, dt_s: float, now_s: float) -> Array:
-        """Setpoints for the valves, ahead of the wanted pressures, with the dither."""
+        """Setpoints for the valves, ahead of the wanted pressures, with the dither.
+
+        Pressures as a target are sent as they are asked for: a calibration is fitted to them.
+        """
+        if isinstance(self._target, PressuresTarget):
+            self._valves.forget()
+            return wanted_pa + self._dither_pa(now_s)
         return self._valves.sent_pa(wanted_pa, dt_s) + self._dither_pa(now_s)
 
     def _dither_pa(self, now_s: float) -> float:
         """What is added to every setpoint.
 
-        Only a reference that is followed with the tip measured needs it: pressures and lengths are
-        sent as they are asked for. A camera lost on the way changes nothing.
+        Only a reference that is followed with the tip measured needs it; a camera lost on the way
+        changes nothing.
         """
         if not self._follower.follows:
             self._dither_since_s = None
