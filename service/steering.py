@@ -141,14 +141,17 @@ class Steering:
         wanted = 0.0 if isinstance(self._target, PressuresTarget) else 1.0
         largest = dt_s / _RAMP_S
         self._lead_share += min(max(wanted - self._lead_share, -largest), largest)
-        ahead_pa = self._valves.sent_pa(wanted_pa, dt_s) - wanted_pa
-        return wanted_pa + (self._lead_share * ahead_pa + self._dither_pa(now_s))
+        ahead_pa = self._valves.sent_pa(wanted_pa, dt_s)
+        if ahead_pa is wanted_pa:  # nothing goes ahead of what is no number
+            return wanted_pa + self._dither_pa(now_s)
+        lead_pa = self._lead_share * (ahead_pa - wanted_pa)
+        return wanted_pa + (lead_pa + self._dither_pa(now_s))
 
     def _dither_pa(self, now_s: float) -> float:
         """What is added to every setpoint.
 
-        Only a reference that is followed with the tip measured needs it: pressures and lengths are
-        sent as they are asked for. A camera lost on the way changes nothing.
+        Only a reference that is followed with the tip measured needs it; a camera lost on the way
+        changes nothing.
         """
         if not self._follower.follows:
             self._dither_since_s = None

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -141,7 +142,8 @@ def assert_files(folder: Path, daemon: Daemon) -> None:
     assert whole.zenoh.listen == (daemon.endpoint,)
     page = (folder / "calibration.html").read_text()
     assert page.count("data:image/png;base64,") >= 3
-    assert "http" not in page.replace("https://", "")
+    # Four letters may stand in a picture's text by chance.
+    assert "http" not in re.sub(r"base64,[^\"]*", "", page)
     assert "rest_length_mm" in page
 
 
