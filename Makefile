@@ -25,8 +25,9 @@ demo: setup
 faults: setup
 	$(BIN)/python -m tests.faults --times $(TIMES) --write docs/safety.md
 
+# Two workers: processes that need their time on one, everything else on the other.
 test: check
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadgroup
 
 # Style, types, import contracts, and generated code that still matches its .proto.
 check: setup
