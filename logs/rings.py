@@ -16,7 +16,10 @@ HOLD_S = 30.0
 _MESSAGE_BYTES = 1008
 _MESSAGES = 32768
 _EVENTS = 4096
-_HEADER = struct.Struct("<Hq")  # index in LOGGED, time
+_HEADER = struct.Struct("<HqBB")  # index in LOGGED, time, this part's number, how many follow
+
+#: A longer message lies in several records, one after another. No message on the wire needs more.
+_MOST_PARTS = 255
 
 #: Longest text of an event where a whole one does not fit, so that the event itself does.
 _SHORT_BYTES = 250
@@ -52,16 +55,23 @@ class MessageWriter:
 
     def __init__(self, memory: RingMemory) -> None:
         self._ring = RingWriter(memory)
+        self._part_bytes = memory.payload_bytes - _HEADER.size
 
     def write(self, topic: Topic, message: Message, time_unix_ns: int) -> None:
-        """Write one message; raises ValueError if it is longer than a record.
+        """Write one message; raises ValueError if it is longer than 255 records.
 
-        The texts of an event are cut to fit: they may hold anything, and the event must arrive.
+        The texts of an event are cut to fit into one: they may hold anything, and the event must
+        arrive.
         """
-        if isinstance(message, pb.Event) and message.ByteSize() > _MESSAGE_BYTES - _HEADER.size:
+        if isinstance(message, pb.Event) and message.ByteSize() > self._part_bytes:
             message = _shortened(message)
-        header = _HEADER.pack(LOGGED.index(topic), time_unix_ns)
-        self._ring.write(header + message.SerializeToString())
+        index, size, payload = LOGGED.index(topic), self._part_bytes, message.SerializeToString()
+        n_parts = max(1, -(-len(payload) // size))
+        if n_parts > _MOST_PARTS:
+            raise ValueError(f"message of {len(payload)} bytes; at most {_MOST_PARTS * size}")
+        for part in range(n_parts):
+            header = _HEADER.pack(index, time_unix_ns, part, n_parts - 1 - part)
+            self._ring.write(header + payload[part * size : (part + 1) * size])
 
 
 def _shortened(event: pb.Event) -> pb.Event:
@@ -77,6 +87,49 @@ def _cut(text: str, size: int) -> str:
     return text.encode()[:size].decode(errors="ignore")
 
 
+class _Joiner:
+    """Reads one ring and joins messages that lie in several records."""
+
+    def __init__(self, memory: RingMemory, next_sequence: int) -> None:
+        self._ring = RingReader(memory, next_sequence)
+        self._parts: list[bytes] = []
+        self._left = 0  # parts that are still to come
+        self._dropped = 0
+
+    def read(self) -> list[tuple[Topic, bytes, int]]:
+        found = []
+        for _, record in self._ring.read(4096):
+            index, time_unix_ns, part, left = _HEADER.unpack_from(record)
+            if not self._continues(part, left):
+                continue
+            self._parts.append(record[_HEADER.size :])
+            self._left = left
+            if left == 0:
+                found.append((LOGGED[index], b"".join(self._parts), time_unix_ns))
+                self._parts = []
+        return found
+
+    def _continues(self, part: int, left: int) -> bool:
+        """Say whether a part comes next; what it leaves incomplete, or itself, is dropped.
+
+        A message stays incomplete when its writer died, or when this reader was lapped.
+        """
+        if part == len(self._parts) and (part == 0 or left == self._left - 1):
+            return True
+        self._dropped += len(self._parts) + (part > 0)
+        self._parts = []
+        return part == 0
+
+    @property
+    def missed(self) -> int:
+        return self._ring.missed + self._dropped
+
+    @property
+    def next_sequence(self) -> int:
+        """Where the first message begins that has not been given out."""
+        return self._ring.next_sequence - len(self._parts)
+
+
 @dataclass
 class MessageReader:
     """Reads messages from several rings, each in its order."""
@@ -87,24 +140,19 @@ class MessageReader:
     def __post_init__(self) -> None:
         """Start at the given positions, or at the beginning."""
         starts = self.positions or [1] * len(self.memories)
-        self._readers = [
-            RingReader(memory, start) for memory, start in zip(self.memories, starts, strict=True)
+        self._rings = [
+            _Joiner(memory, start) for memory, start in zip(self.memories, starts, strict=True)
         ]
 
     def read(self) -> list[tuple[Topic, bytes, int]]:
         """Return what is new as (topic, payload, time_unix_ns)."""
-        found = []
-        for reader in self._readers:
-            for _, record in reader.read(4096):
-                index, time_unix_ns = _HEADER.unpack_from(record)
-                found.append((LOGGED[index], record[_HEADER.size :], time_unix_ns))
-        return found
+        return [message for ring in self._rings for message in ring.read()]
 
     @property
     def missed(self) -> int:
-        """Records that were overwritten before they were read."""
-        return sum(reader.missed for reader in self._readers)
+        """Records that were overwritten before they were read, or belong to no whole message."""
+        return sum(ring.missed for ring in self._rings)
 
     def next_sequences(self) -> list[int]:
         """Return where to go on reading, one number a ring."""
-        return [reader.next_sequence for reader in self._readers]
+        return [ring.next_sequence for ring in self._rings]

@@ -1,21 +1,31 @@
 """`pneuarm emulate camera`: publishes what motion capture would measure of a simulated arm.
 
-It reads the true tip from `state`, waits, adds noise, and publishes the pose in the base frame.
+It reads the true tip from `state`, waits, adds noise, and publishes the pose of the marker in the
+frame of motion capture, both as the daemon's `[frames]` have them: in the base where no such frame
+is configured.
 """
 
 import argparse
+import contextlib
 import time
+import tomllib
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from google.protobuf.message import DecodeError
 
 from controllers.errors import DaemonUnreachable, InvalidInput
+from controllers.frames import Frames, Transform
+from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from logs.codec import encoding_of
 from logs.schema import pneuarm_pb2 as pb
 from logs.topics import STATE, TIP_POSE, full_key
 from service import network
+from service.client import Client
+from service.config import check
 
 #: Without a state for so long (s) there is no daemon.
 _PATIENCE_S = 3.0
@@ -23,11 +33,15 @@ _POLL_S = 0.0005
 
 
 class Camera:
-    """Poses of the true tip: ``delay_s`` late, with noise; at most ``rate_hz`` a second."""
+    """Poses of the marker: ``delay_s`` late, with noise; at most ``rate_hz`` a second."""
 
-    def __init__(self, rate_hz: float, delay_s: float, noise_m: float, seed: int) -> None:
+    def __init__(
+        self, rate_hz: float, delay_s: float, noise_m: float, seed: int, frames: Frames
+    ) -> None:
         self._period_s, self._delay_s, self._noise_m = 1.0 / rate_hz, delay_s, noise_m
         self._rng = np.random.default_rng(seed)
+        self._frame_id = frames.mocap_frame or "base"
+        self._frames = frames if frames.mocap_frame else replace(frames, mocap_to_base=Transform())
         self._next_s = 0.0
         self._waiting: deque[tuple[float, PoseInFrame]] = deque()
 
@@ -43,15 +57,25 @@ class Camera:
         if now_s < self._next_s:
             return
         self._next_s = max(self._next_s + self._period_s, now_s - self._period_s)
-        pose = PoseInFrame(frame_id="base")
+        self._waiting.append((now_s + self._delay_s, self._picture(state)))
+
+    def _picture(self, state: pb.ArmState) -> PoseInFrame:
+        """Pose of the marker; the true tip of a state is the tool point's."""
+        true = Transform(
+            rotation_from_quaternion(np.array(state.tip_true_orientation_xyzw)),
+            np.array(state.tip_true_position_m),
+        )
+        tool = Transform(position_m=np.array(self._frames.tool_m))
+        marker = self._frames.marker_pose(true @ tool.inverse())
+        position = marker.position_m + self._rng.normal(0.0, self._noise_m, 3)
+        pose = PoseInFrame(frame_id=self._frame_id)
         pose.timestamp.FromNanoseconds(state.time_unix_ns)
-        noise = self._rng.normal(0.0, self._noise_m, 3)
-        position = np.array(state.tip_true_position_m) + noise
         for axis, value in zip("xyz", position.tolist(), strict=True):
             setattr(pose.pose.position, axis, value)
-        for axis, value in zip("xyzw", state.tip_true_orientation_xyzw, strict=True):
+        quaternion = quaternion_from_rotation(marker.rotation)
+        for axis, value in zip("xyzw", quaternion.tolist(), strict=True):
             setattr(pose.pose.orientation, axis, value)
-        self._waiting.append((now_s + self._delay_s, pose))
+        return pose
 
     def due(self, now_s: float) -> PoseInFrame | None:
         """Return the next pose whose time has come."""
@@ -66,9 +90,9 @@ def emulate_camera(arguments: argparse.Namespace) -> int:
         value = getattr(arguments, name)
         if not 0.0 <= value < 1e4 or (name == "rate" and value <= 0.0):
             raise InvalidInput(f"--{name.replace('_', '-')} {value:g}: a number above 0 is needed")
-    camera = Camera(
-        arguments.rate, 1e-3 * arguments.delay_ms, 1e-3 * arguments.noise_mm, arguments.seed
-    )
+    delay_s, noise_m = 1e-3 * arguments.delay_ms, 1e-3 * arguments.noise_mm
+    frames = _frames(arguments)
+    camera = Camera(arguments.rate, delay_s, noise_m, arguments.seed, frames)
     session = network.open_connected(arguments.connect)
     try:
         count = _publish(session, camera, arguments)
@@ -76,6 +100,12 @@ def emulate_camera(arguments: argparse.Namespace) -> int:
         session.close()
     print(f"{count} poses published")
     return 0
+
+
+def _frames(arguments: argparse.Namespace) -> Frames:
+    """Ask the daemon where motion capture, marker and tool are."""
+    with Client(arguments.arm, arguments.connect, "camera") as client:
+        return check(tomllib.loads(client.info().config_toml), "the daemon").frames.frames()
 
 
 def _publish(session: "zenoh.Session", camera: Camera, arguments: argparse.Namespace) -> int:
@@ -95,7 +125,8 @@ def _publish(session: "zenoh.Session", camera: Camera, arguments: argparse.Names
         sample = states.try_recv()
         if sample is not None:
             heard_s = now_s
-            camera.see(pb.ArmState.FromString(sample.payload.to_bytes()), now_s)
+            with contextlib.suppress(DecodeError):  # no state: not the daemon's
+                camera.see(pb.ArmState.FromString(sample.payload.to_bytes()), now_s)
         elif now_s - heard_s > _PATIENCE_S:
             raise DaemonUnreachable(
                 f"no state of arm {arguments.arm!r} under {arguments.connect} for {_PATIENCE_S:g} "

@@ -98,10 +98,12 @@ def _add_emulated_device(devices: Subparsers, name: str) -> None:
         "service.commands_emulate:emulate",
         f"{name}, with the simulated arm behind it.",
     )
-    device.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
     device.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
     device.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
     device.add_argument("--record", type=Path, metavar="FILE", help="what reaches it, JSON lines")
+    if not name.startswith("festo"):
+        return
+    device.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
     device.add_argument("--watchdog-ms", type=int, help="its own watchdog at power-on")
     device.add_argument("--fail-safe", choices=("reset", "hold"), default="reset")
 

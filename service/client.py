@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 import zenoh
-from google.protobuf.message import Message
+from google.protobuf.message import DecodeError, Message
 
 from controllers.errors import (
     DaemonUnreachable,
@@ -119,15 +119,23 @@ class Client:
         waited_until = time.monotonic() + timeout_s
         while True:
             sample = self._states.try_recv()
-            if sample is not None:
-                self._newest = pb.ArmState.FromString(sample.payload.to_bytes())
-                self._received_s = time.monotonic()
-            elif self._newest is not None and self._fresh():
+            if sample is not None and self._take(sample):
+                continue
+            if self._newest is not None and self._fresh():
                 return self._newest
             elif time.monotonic() > waited_until:
                 raise DaemonUnreachable(f"no state of arm {self.arm!r} for {timeout_s:g} s")
             else:
                 time.sleep(0.001)
+
+    def _take(self, sample: zenoh.Sample) -> bool:
+        """Keep a state; what is none was published by somebody else, and is passed over."""
+        try:
+            self._newest = pb.ArmState.FromString(sample.payload.to_bytes())
+        except DecodeError:
+            return False
+        self._received_s = time.monotonic()
+        return True
 
     def _fresh(self) -> bool:
         return time.monotonic() - self._received_s < 0.1
@@ -146,7 +154,8 @@ class Client:
         """Return the events since the last call."""
         found = []
         while (sample := self._events.try_recv()) is not None:
-            found.append(decode(pb.Event, sample.payload.to_bytes(), str(sample.encoding)))
+            with contextlib.suppress(TargetRejected):  # no event: not the daemon's
+                found.append(decode(pb.Event, sample.payload.to_bytes(), str(sample.encoding)))
         return found
 
     def info(self) -> pb.Info:

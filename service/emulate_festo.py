@@ -45,7 +45,7 @@ def _arm(arguments: argparse.Namespace, configuration: Configuration) -> Emulate
         record = None if arguments.record is None else DeviceRecord(arguments.record)
     except OSError as error:
         raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
-    return EmulatedArm(configuration.build_arm(), arguments.seed, record)
+    return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
 
 
 def _watchdog(arguments: argparse.Namespace, table: FestoConfig) -> TerminalWatchdog:

@@ -49,7 +49,7 @@ _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 class Supervisor:
-    """One daemon: its locks, its shared memory, its four processes."""
+    """One daemon: its locks, its shared memory, its processes."""
 
     def __init__(self, configuration: Configuration, say: Callable[[str], None]) -> None:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""

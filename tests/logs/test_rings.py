@@ -5,7 +5,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logs.ring import RingMemory, RingReader
+from logs.ring import RingMemory, RingReader, RingWriter
 from logs.rings import HOLD_S, MessageReader, MessageWriter, Rings
 from logs.schema import pneuarm_pb2 as pb
 from logs.tick import tick_dtype
@@ -89,10 +89,84 @@ def test_what_is_not_logged_has_no_place_in_a_ring() -> None:
         MessageWriter(memory()).write(ESTOP, event(""), 0)
 
 
+def long_target(n_waypoints: int = 200) -> pb.Target:
+    waypoints = [
+        pb.Waypoint(time_s=0.1 * n, position_m=pb.Vector3(x=0.01 * n, y=0.1, z=0.2))
+        for n in range(n_waypoints)
+    ]
+    return pb.Target(sequence=7, trajectory=pb.TrajectoryTarget(waypoints=waypoints))
+
+
+def test_a_message_longer_than_a_record_comes_back_whole_and_in_order() -> None:
+    ring = memory()
+    writer, reader = MessageWriter(ring), MessageReader((ring,))
+    target = long_target()
+    assert target.ByteSize() > 5000
+    for number in range(20):  # several times around the ring
+        writer.write(EVENT, event("before"), number)
+        writer.write(TARGET, target, number)
+        found = reader.read()
+        assert [topic for topic, _, _ in found] == [EVENT, TARGET]
+        assert pb.Target.FromString(found[1][1]) == target
+        assert found[1][2] == number
+    assert (reader.missed, reader.next_sequences()) == (0, [RingReader(ring).head() + 1])
+
+
+def records_of(message: pb.Target) -> list[bytes]:
+    ring = memory()
+    MessageWriter(ring).write(TARGET, message, 1)
+    return [record for _, record in RingReader(ring).read(64)]
+
+
+def test_a_successor_begins_with_the_message_that_its_predecessor_had_not_whole() -> None:
+    ring, target = memory(), long_target()
+    first = MessageReader((ring,))
+    MessageWriter(ring).write(EVENT, event("a"), 0)
+    writer = RingWriter(ring)
+    records = records_of(target)
+    for record in records[:3]:
+        writer.write(record)
+    assert texts(first.read()) == ["a"]
+    assert first.next_sequences() == [2]
+    for record in records[3:]:
+        writer.write(record)
+    for reader in (first, MessageReader((ring,), first.next_sequences())):
+        ((topic, payload, _),) = reader.read()
+        assert (topic, pb.Target.FromString(payload)) == (TARGET, target)
+        assert reader.missed == 0
+
+
+@pytest.mark.parametrize("cut", [1, 3])
+def test_what_a_dead_writer_left_incomplete_is_dropped_and_counted(cut: int) -> None:
+    ring, records = memory(), records_of(long_target())
+    writer = RingWriter(ring)
+    for record in records[:cut]:
+        writer.write(record)
+    MessageWriter(ring).write(EVENT, event("successor"), 1)
+    reader = MessageReader((ring,))
+    assert texts(reader.read()) == ["successor"]
+    assert reader.missed == cut
+
+
+def test_a_reader_that_is_lapped_within_a_message_goes_on_with_the_next_whole_one() -> None:
+    ring, records = memory(8), records_of(long_target(60))
+    assert 2 < len(records) < 8
+    writer = RingWriter(ring)
+    for number in range(30):
+        writer.write(records[number % len(records)])
+    MessageWriter(ring).write(EVENT, event("last"), 1)
+    reader = MessageReader((ring,))
+    found = reader.read()
+    assert found[-1][0] == EVENT
+    assert all(pb.Target.FromString(p) == long_target(60) for t, p, _ in found if t == TARGET)
+    whole = sum(len(records) if topic == TARGET else 1 for topic, _, _ in found)
+    assert reader.missed + whole == 31
+
+
 def test_a_message_that_is_too_long_is_refused() -> None:
     ring = memory()
     with pytest.raises(ValueError, match="at most"):
-        MessageWriter(ring).write(TARGET, pb.Target(client_id="x" * 2000), 0)
+        MessageWriter(ring).write(TARGET, pb.Target(client_id="x" * 300_000), 0)
     assert RingReader(ring).head() == 0
 
 

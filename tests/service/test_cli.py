@@ -101,6 +101,8 @@ def test_what_was_not_said_has_its_default() -> None:
         (["send", "lengths", "200", "two", "200"], "invalid float value: 'two'"),
         (["send", "twist", "1", "2", "3", "--seconds", "soon"], "argument --seconds"),
         (["send", "twist", "1", "2", "3", "--frame", "world"], "invalid choice: 'world'"),
+        (["emulate", "esp32", "--port", "5020"], "unrecognized arguments: --port"),
+        (["emulate", "ctrl-p", "--fail-safe", "hold"], "unrecognized arguments: --fail-safe"),
         (["send", "position", "1", "2", "3", "--law", "pid"], "argument --law"),
         (["run", "--arm", "octopus"], "invalid choice: 'octopus'"),
         (["demo", "--seed", "1.5"], "invalid int value: '1.5'"),

@@ -16,6 +16,7 @@ from controllers.errors import (
     TargetRejected,
 )
 from logs.schema import pneuarm_pb2 as pb
+from logs.topics import EVENT, STATE, full_key
 from pneuarm import Client
 from tests.service.daemon import Daemon, free_port, wait_for
 
@@ -177,6 +178,21 @@ def test_stop_that_nothing_shows_is_not_confirmed(client: Client, daemon: Daemon
         os.kill(gateway, signal.SIGCONT)
     wait_for(lambda: client.state().mode == pb.ESTOP, "the belated stop")
     client.reset()
+
+
+def test_what_is_no_state_and_no_event_is_passed_over(client: Client, daemon: Daemon) -> None:
+    client.events()
+    newest = 0
+    with daemon.client("rogue") as rogue:
+        for _ in range(20):
+            for topic in (STATE, EVENT):
+                rogue._session.put(full_key(daemon.arm, topic.key), b"\xff\xff\xff")
+            time.sleep(0.003)
+            state = client.state()
+            assert state.mode == pb.READY
+            assert state.sequence >= newest
+            newest = state.sequence
+            client.events()
 
 
 def test_info_is_the_daemons(client: Client, daemon: Daemon) -> None:

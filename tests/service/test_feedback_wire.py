@@ -72,3 +72,19 @@ def test_a_file_of_waypoints_is_sent(tmp_path: Path) -> None:
         done = run_command("send", "trajectory", str(path), *connection)
         assert done.returncode == 1
         assert "line 1: '0 1 2'; four numbers are needed" in done.stderr
+
+
+def test_the_longest_trajectory_runs_and_is_logged_whole(tmp_path: Path) -> None:
+    waypoints = [(0.1 + 0.015 * n, (1e-4 * n, 0.0, 0.2)) for n in range(200)]
+    target = trajectory_target(waypoints)
+    with Daemon(tmp_path) as daemon:
+        with daemon.client() as client:
+            client.enable()
+            state = client.wait_until_reached(target, 30.0)
+            assert state.target_kind == pb.TRAJECTORY
+            assert state.reach == pb.REACHED
+        daemon.stop()
+        messages = [entry.message for entry in daemon.log()]
+    found = [message for message in messages if isinstance(message, pb.Target)]
+    assert found
+    assert all(message.trajectory == target.trajectory for message in found)
