@@ -13,7 +13,14 @@ from controllers.dither import Dither
 from controllers.estimator import TipEstimate
 from controllers.feedback import FeedbackSettings, TipObserver, Verdict
 from controllers.follower import Follower, lead_of
-from controllers.targets import PoseTarget, PositionTarget, PressuresTarget, ShapeTarget, Target
+from controllers.targets import (
+    LengthsTarget,
+    PoseTarget,
+    PositionTarget,
+    PressuresTarget,
+    ShapeTarget,
+    Target,
+)
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
 from controllers.valve_lead import ValveLead
@@ -23,6 +30,9 @@ from service.commands import SetTarget, SetTipPose
 Tell = Callable[["pb.Level", str, str, str, str], None]
 
 _NONE = np.full(3, np.nan)
+
+#: Targets in which nothing is said of the tip: no measured one is followed.
+_OF_CHAMBERS = (LengthsTarget, PressuresTarget)
 
 #: The dither grows from nothing, and a share of the hysteresis or the lead from 0 to 1, in this
 #: time (s).
@@ -154,6 +164,10 @@ class Steering:
             self._share = 1.0
             self._controller.set_hysteresis_share(1.0)
             return 0.0
+        if isinstance(self._target, _OF_CHAMBERS):
+            self._dither_since_s = None
+            self._go_to_share(1.0)
+            return 0.0
         if self._dither_since_s is None:
             if not (self.observer.seen and self._feedback.enabled):
                 return 0.0
@@ -167,6 +181,9 @@ class Steering:
         motion, feedback = self._follower.motion, self._feedback
         moving = motion is not None and max(map(abs, motion.velocity[:3])) > _MOVING_M_S
         wanted = feedback.hysteresis_share_moving if moving else feedback.hysteresis_share
+        self._go_to_share(wanted)
+
+    def _go_to_share(self, wanted: float) -> None:
         largest = self._dt_s / _RAMP_S
         self._share += min(max(wanted - self._share, -largest), largest)
         self._controller.set_hysteresis_share(self._share)
