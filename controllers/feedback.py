@@ -53,8 +53,8 @@ class FeedbackSettings:
     length_sigma_m: float = 0.01
     dither_pa: float = 1500.0
     dither_period_s: float = 0.03
-    hysteresis_share: float = 0.45
-    hysteresis_share_moving: float = 0.65
+    hysteresis_share: float = 0.35
+    hysteresis_share_moving: float = 0.5
 
 
 class Verdict(Enum):
