@@ -16,6 +16,7 @@ import numpy as np
 from controllers.arm import Arm, Array
 from controllers.frames import rotation_from_vector, rotation_vector
 from controllers.prediction import Prediction
+from controllers.tasks.tip_pose import quaternion_from_rotation
 
 #: Time constant (s) by which the estimate follows the measured difference, and its scatter.
 _FAST_S, _SCATTER_S = 0.02, 0.5
@@ -52,8 +53,8 @@ class FeedbackSettings:
     length_sigma_m: float = 0.01
     dither_pa: float = 1500.0
     dither_period_s: float = 0.03
-    hysteresis_share: float = 0.45
-    hysteresis_share_moving: float = 0.65
+    hysteresis_share: float = 0.35
+    hysteresis_share_moving: float = 0.5
 
 
 class Verdict(Enum):
@@ -67,7 +68,8 @@ class Verdict(Enum):
 class TipObserver:
     """The correction, from measured tip poses of known age.
 
-    ``offset_m`` (3,) and ``rotation`` (3, 3) are what :meth:`Controller.set_correction` takes.
+    ``offset_m`` (3,) and ``rotation`` (3, 3) are what :meth:`Controller.set_correction` takes. They
+    are replaced, never written into.
     """
 
     def __init__(self, arm: Arm, settings: FeedbackSettings, period_s: float) -> None:
@@ -75,6 +77,7 @@ class TipObserver:
         self._delay_s = arm.response.delay_s
         self.prediction = Prediction(arm, period_s)
         self.offset_m, self.rotation = np.zeros(3), np.eye(3)
+        self.quaternion_xyzw = quaternion_from_rotation(self.rotation)
         self.seen = False
         self.refused = 0
         self._turn = np.zeros(3)
@@ -142,6 +145,7 @@ class TipObserver:
         share = min(1.0, 0.01 / self._settings.time_constant_s)
         self._turn = self._turn + share * (turn - self._turn)
         self.rotation = rotation_from_vector(self._turn)
+        self.quaternion_xyzw = quaternion_from_rotation(self.rotation)
 
     def step(self, lengths_m: Array) -> None:
         """Go on by one tick under commanded lengths (n_sections, 3).

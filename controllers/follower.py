@@ -100,7 +100,7 @@ class Follower:
         self._moving_goal = False
         self._since_s = self._shape_s = 0.0
         self._chart = np.eye(3)
-        self._acceleration = np.zeros(3)
+        self._acceleration = [0.0] * 3
         self._stream.forget()
 
     @property
@@ -124,6 +124,8 @@ class Follower:
         target = self._target
         if not isinstance(target, ShapeTarget):
             return [math.nan] * 3
+        if self._reference is not None and self._reference.arrived:
+            return self._reference.now.position
         return target.shape.at(min(self._shape_s, target.shape.duration_s)).position
 
     @property
@@ -237,19 +239,31 @@ class Follower:
         self._shape_s += dt_s
         self._stand_in_the_end(reference)
         motion = reference.step(dt_s)
-        position, velocity, acceleration = (np.array(part) for part in motion)
-        lead = self._lead
-        ahead = position + lead.velocity_s * velocity + lead.acceleration_s2 * acceleration
-        jerk = (acceleration[:3] - self._acceleration) / dt_s
-        self._acceleration = acceleration[:3]
-        jerk = np.minimum(np.maximum(jerk, -self._jerk_max), self._jerk_max)
-        rate = velocity[:3] + lead.velocity_s * self._acceleration + lead.acceleration_s2 * jerk
+        by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
+        ahead = np.array(
+            [p + by_velocity * v + by_acceleration * a for p, v, a in zip(*motion, strict=True)]
+        )
         if reference is self._position:
+            rate = np.array(self._rate(motion, dt_s))
             return PositionTarget(ahead, self._target.law, rate, self._nearest_m())
         # The law follows a pose by its gain alone, 1 / gain behind.
-        ahead += (velocity + lead.velocity_s * acceleration) / self._gain_per_s
+        _, velocity, acceleration = (np.array(part) for part in motion)
+        self._acceleration = motion.acceleration[:3]
+        ahead += (velocity + by_velocity * acceleration) / self._gain_per_s
         turned = rotation_from_vector(ahead[3:]) @ self._chart
         return PoseTarget(ahead[:3], quaternion_from_rotation(turned), self._target.law)
+
+    def _rate(self, motion: Motion, dt_s: float) -> list[float]:
+        """Velocity (3,) of what the law is given, with the jerk within its limit."""
+        by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
+        most, rate = self._jerk_max, []
+        for v, a, before in zip(
+            motion.velocity, motion.acceleration, self._acceleration, strict=False
+        ):
+            jerk = min(max((a - before) / dt_s, -most), most)
+            rate.append(v + by_velocity * a + by_acceleration * jerk)
+        self._acceleration = motion.acceleration
+        return rate
 
     def _nearest_m(self) -> Array | None:
         """Lengths nearest to a position out of reach, once the reference stands there."""

@@ -45,6 +45,7 @@ class Motion:
         self._lengths, self._rates = np.zeros(arm.n_chambers), np.zeros(arm.n_chambers)
         self._dt = np.full(1, 1e-3)
         self.limits = Limits(arm)
+        self._correction: tuple[Array | None, Array | None] = None, None
         self.wanted, self.pursued = Wanted(arm.n_chambers), Wanted(arm.n_chambers)
         self._position_only, self._whole = (
             _Compiled(arm, self.limits, whole) for whole in (False, True)
@@ -103,6 +104,9 @@ class Motion:
 
     def correct(self, offset_m: Array, rotation: Array) -> None:
         """See the tip at ``p(q) + offset_m`` (3,) with ``rotation`` (3, 3) before the model's."""
+        if offset_m is self._correction[0] and rotation is self._correction[1]:
+            return  # between two measured poses nothing changes, and nobody writes into them
+        self._correction = offset_m, rotation
         self.wanted.correct(offset_m, rotation)
         self.pursued.correct(offset_m, rotation)
 

@@ -28,8 +28,8 @@ class ValveLead:
         """The next pressures are the first ones."""
         self._last = None
 
-    def sent_pa(self, wanted_pa: Array, dt_s: float) -> Array:
-        """Pressures ahead of the wanted ones by the lag.
+    def sent_pa(self, wanted_pa: Array, dt_s: float, lead: float = 1.0) -> Array:
+        """Pressures ahead of the wanted ones by the lag, or by the share ``lead`` of it.
 
         Pressures that are no finite numbers are returned as they are, and forgotten: they are the
         guard's affair, and no derivative must remember them.
@@ -43,4 +43,4 @@ class ValveLead:
         share = 1.0 / (self.remaining_s + dt_s)
         self._rate = self._rate + share * (wanted_pa - self._last - dt_s * self._rate)
         self._last = wanted_pa
-        return wanted_pa + self._lead_s * self._rate
+        return wanted_pa + lead * self._lead_s * self._rate

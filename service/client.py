@@ -310,7 +310,7 @@ class Client:
         while time.monotonic() < waited_until:
             time.sleep(_REFRESH_S)
             state = self.state()
-            self.raise_if_refused()
+            self.raise_if_refused(first)
             if state.mode != pb.ACTIVE:
                 mode = pb.Mode.Name(state.mode).lower()
                 raise ModeRefused(f"the arm is in mode {mode} and follows no target; enable it")
@@ -319,10 +319,26 @@ class Client:
             self.send(target)
         raise NotConfirmed(f"not reached within {timeout_s:g} s")
 
-    def raise_if_refused(self) -> None:
-        """Raise TargetRejected if the daemon has refused a target of this client's."""
+    def raise_if_refused(self, first: int = 0) -> None:
+        """Raise TargetRejected if the daemon has refused a target of this client's.
+
+        Targets before number ``first`` do not count: their refusals may come late.
+        """
         for event in self.events():
             ours = event.code == "rejected" and event.client_id == self.client_id
             # A refused request was raised by its own call; its event may come after that.
-            if ours and event.text.startswith(TARGET.key):
+            if not ours or not event.text.startswith(TARGET.key):
+                continue
+            if self._number_of(event.payload) >= first:
                 raise TargetRejected(event.text)
+
+    def _number_of(self, payload: bytes) -> int:
+        """Sequence number of a target of this client's, of which only the beginning is there."""
+        head = pb.Target(client_id=self.client_id, lease_secret=self._secret)
+        number = shift = 0
+        for byte in payload[head.ByteSize() + 1 :]:  # after the field's tag: a varint
+            number |= (byte & 0x7F) << shift
+            shift += 7
+            if byte < 0x80:
+                break
+        return number

@@ -1,5 +1,6 @@
 """Everything between a target and the pressures of a tick: reference, correction, law, dither."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,8 +13,14 @@ from controllers.dither import Dither
 from controllers.estimator import TipEstimate
 from controllers.feedback import FeedbackSettings, TipObserver, Verdict
 from controllers.follower import Follower, lead_of
-from controllers.kinematics.compiled import TipState
-from controllers.targets import PoseTarget, PositionTarget, PressuresTarget, ShapeTarget, Target
+from controllers.targets import (
+    LengthsTarget,
+    PoseTarget,
+    PositionTarget,
+    PressuresTarget,
+    ShapeTarget,
+    Target,
+)
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
 from controllers.valve_lead import ValveLead
@@ -23,6 +30,9 @@ from service.commands import SetTarget, SetTipPose
 Tell = Callable[["pb.Level", str, str, str, str], None]
 
 _NONE = np.full(3, np.nan)
+
+#: Targets in which nothing is said of the tip: no measured one is followed.
+_OF_CHAMBERS = (LengthsTarget, PressuresTarget)
 
 #: The dither grows from nothing, and a share of the hysteresis or the lead from 0 to 1, in this
 #: time (s).
@@ -94,11 +104,11 @@ class Steering:
         self._follower.forget()
         self._valves.forget()
         self._target = None
-        self.tip_m = self._tip_before_m = self._corrected().position_m
+        self._correct()
+        self.tip_m = self._tip_before_m = self._controller.tip().position_m
 
-    def _corrected(self) -> TipState:
+    def _correct(self) -> None:
         self._controller.set_correction(self.observer.offset_m, self.observer.rotation)
-        return self._controller.tip()
 
     def measure(self, pose: SetTipPose, now_ns: int) -> None:
         """Take a measured tip pose, or say once why not."""
@@ -124,7 +134,7 @@ class Steering:
         """One tick of an active arm; returns gauge pressures (n_sections, 3) without the dither."""
         self._dt_s = dt_s or self._dt_s
         self._tip_before_m = self.tip_m
-        self._corrected()
+        self._correct()
         wanted = self._follower.step(dt_s) if dt_s > 0.0 else None
         if wanted is not None:
             awaited = self.observer.seen and self._feedback.enabled and not self._near
@@ -141,11 +151,7 @@ class Steering:
         wanted = 0.0 if isinstance(self._target, PressuresTarget) else 1.0
         largest = dt_s / _RAMP_S
         self._lead_share += min(max(wanted - self._lead_share, -largest), largest)
-        ahead_pa = self._valves.sent_pa(wanted_pa, dt_s)
-        if ahead_pa is wanted_pa:  # nothing goes ahead of what is no number
-            return wanted_pa + self._dither_pa(now_s)
-        lead_pa = self._lead_share * (ahead_pa - wanted_pa)
-        return wanted_pa + (lead_pa + self._dither_pa(now_s))
+        return self._valves.sent_pa(wanted_pa, dt_s, self._lead_share) + self._dither_pa(now_s)
 
     def _dither_pa(self, now_s: float) -> float:
         """What is added to every setpoint.
@@ -157,6 +163,10 @@ class Steering:
             self._dither_since_s = None
             self._share = 1.0
             self._controller.set_hysteresis_share(1.0)
+            return 0.0
+        if isinstance(self._target, _OF_CHAMBERS):
+            self._dither_since_s = None
+            self._go_to_share(1.0)
             return 0.0
         if self._dither_since_s is None:
             if not (self.observer.seen and self._feedback.enabled):
@@ -171,6 +181,9 @@ class Steering:
         motion, feedback = self._follower.motion, self._feedback
         moving = motion is not None and max(map(abs, motion.velocity[:3])) > _MOVING_M_S
         wanted = feedback.hysteresis_share_moving if moving else feedback.hysteresis_share
+        self._go_to_share(wanted)
+
+    def _go_to_share(self, wanted: float) -> None:
         largest = self._dt_s / _RAMP_S
         self._share += min(max(wanted - self._share, -largest), largest)
         self._controller.set_hysteresis_share(self._share)
@@ -197,7 +210,7 @@ class Steering:
         observer = self.observer
         tick["tip_model_position_m"] = observer.prediction.ago(0.0)[0]
         tick["tip_offset_m"] = observer.offset_m
-        tick["tip_offset_orientation_xyzw"] = quaternion_from_rotation(observer.rotation)
+        tick["tip_offset_orientation_xyzw"] = observer.quaternion_xyzw
         tick["tip_estimated_position_m"] = estimate.position_m
         tick["tip_estimated_orientation_xyzw"] = quaternion_from_rotation(estimate.rotation)
         tick["tip_estimated_sigma_m"] = estimate.sigma_m
@@ -210,8 +223,7 @@ class Steering:
             return
         tick["reference_position_m"] = motion.position[:3]
         tick["reference_velocity_m_s"] = motion.velocity[:3]
-        off = estimate.position_m - motion.position[:3]
-        error_m = float(np.sqrt(off @ off))
+        error_m = math.dist(estimate.position_m.tolist(), motion.position[:3])
         tick["reference_error_m"] = error_m
         self._near = error_m <= self._controller.settings.reached_tolerance_m
 

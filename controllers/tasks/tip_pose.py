@@ -33,8 +33,9 @@ def quaternion_from_rotation(rotation: Array) -> Array:
         (h - f, c - g, d - b, squares[3]),
     )
     row = rows[squares.index(max(squares))]
-    norm = math.copysign(math.sqrt(sum(value * value for value in row)), row[3])
-    return np.array(row) / norm
+    x, y, z, w = row
+    norm = math.copysign(math.sqrt(x * x + y * y + z * z + w * w), w)
+    return np.array((x / norm, y / norm, z / norm, w / norm))
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,9 @@ class Wanted:
 
     def __setitem__(self, name: str, value: ArrayLike) -> None:
         part = self._parts[name]
-        part[...] = np.asarray(value, dtype=np.float64).reshape(-1)
+        if isinstance(value, np.ndarray) and value.ndim != 1:
+            value = value.reshape(-1)
+        part[...] = value
 
     def __getitem__(self, name: str) -> Array:
         return self._parts[name]

@@ -40,8 +40,8 @@ class FeedbackConfig(Table):
     length_sigma_mm: Positive = 10.0
     dither_mbar: Annotated[float, Field(ge=0, le=100)] = 15.0
     dither_period_ms: Annotated[float, Field(ge=4, le=1000)] = 30.0
-    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.45
-    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.65
+    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.35
+    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.5
 
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""

@@ -27,7 +27,9 @@ def test_the_camera_program_takes_the_tip_to_its_target_and_is_missed(tmp_path: 
             cwd=ROOT,
         )
         try:
-            wait_for(lambda: client.state().tip_estimated_source == pb.FROM_TIP_POSE, "the camera")
+            wait_for(
+                lambda: client.state().tip_estimated_source == pb.FROM_TIP_POSE, "the camera", 60.0
+            )
             client.enable()
             state = client.move_to((0.03, 0.0, 0.2), timeout_s=30.0)
             assert state.reach == pb.REACHED

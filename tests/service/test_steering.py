@@ -5,7 +5,7 @@ import pytest
 
 from controllers.estimator import EstimateSource
 from controllers.shapes import Circle
-from controllers.targets import LengthsTarget
+from controllers.targets import LengthsTarget, PressuresTarget
 from tests.bench.rig import Rig
 from tests.service.simulated import configuration_of
 
@@ -75,3 +75,12 @@ def test_targets_without_a_reference_pass_it_by(rig: Rig) -> None:
     again = rig.to(HOME, 0.02)
     jump = np.linalg.norm(np.diff(again["tip_commanded_position_m"], axis=0), axis=1).max()
     assert jump < 1e-3
+
+
+def test_pressures_are_sent_without_lead_or_dither(rig: Rig) -> None:
+    rig.run(1.0, PressuresTarget(np.zeros((1, 3))))
+    wanted_pa = np.array([[2e4, 1e4, 0.0]])
+    sent_pa = rig.run(1.0, PressuresTarget(wanted_pa))["pressure_sent_pa"]
+    assert sent_pa[-1] == pytest.approx(wanted_pa, abs=50.0)
+    assert np.diff(sent_pa, axis=0).min() > -1.0  # never beyond and back, which crosses the play
+    assert sent_pa.max(axis=0) == pytest.approx(wanted_pa, abs=50.0)
