@@ -7,7 +7,6 @@ from dataclasses import dataclass
 class MonitorSettings:
     """See docs/configuration.md, ``[monitors]``, for what each means."""
 
-    valve_time_constant_s: float
     deviation_pa: float
     deviation_s: float
     vent_timeout_s: float

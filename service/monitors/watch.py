@@ -61,7 +61,7 @@ class Watch:
         self._always = always(settings)
         self._all = (*self._always, *of_fresh(arm, settings))
         self._fresh_s = settings.measurement_age_s
-        self._lag = Lag(settings.valve_time_constant_s)
+        self._lag = Lag(arm.response)
 
     def look(
         self,

@@ -15,7 +15,6 @@ Lasting = Annotated[float, Field(ge=0, le=10000)]
 class MonitorsConfig(Table):
     """When something counts as a fault: how much of it, and for how long."""
 
-    valve_time_constant_ms: Annotated[float, Field(gt=0, le=5000)] = 60.0
     deviation_bar: Positive = 0.1
     deviation_ms: Lasting = 300.0
     vent_timeout_s: Annotated[float, Field(gt=0, le=600)] = 3.0
@@ -44,7 +43,6 @@ class MonitorsConfig(Table):
     def settings(self) -> MonitorSettings:
         """Return the thresholds in SI units."""
         return MonitorSettings(
-            valve_time_constant_s=self.valve_time_constant_ms * MS,
             deviation_pa=self.deviation_bar * BAR,
             deviation_s=self.deviation_ms * MS,
             vent_timeout_s=self.vent_timeout_s,

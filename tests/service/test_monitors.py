@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from controllers.actuation import PressureMap
+from controllers.arm import Response
 from controllers.kinematics.compiled import CompiledKinematics
 from service.faults import FaultCode
 from service.mode import Mode
@@ -154,14 +155,33 @@ def test_chambers_are_counted_from_one_and_pressures_told_in_bar() -> None:
 
 
 def test_the_lag_is_of_first_order_and_exact_for_any_step() -> None:
-    lag, coarse = Lag(0.06), Lag(0.06)
+    response = Response(delay_s=0.0, lag_s=0.06)
+    lag, coarse = Lag(response), Lag(response)
     lag.advance([0.0], [500.0], 0.0)
     coarse.advance([0.0], [500.0], 0.0)
     for _ in range(60):
         fine = lag.advance([1e5], [0.0], 1e-3)
     assert fine == pytest.approx(coarse.advance([1e5], [0.0], 0.06))
     assert fine == pytest.approx([1e5 + exp(-1.0) * (500.0 - 1e5)])
-    assert Lag(0.06).advance([7.0, 7.0], [nan, 3.0], 1.0) == [0.0, 3.0]
+    assert Lag(response).advance([7.0, 7.0], [nan, 3.0], 1.0) == [0.0, 3.0]
+
+
+@pytest.mark.parametrize("step_s", [1e-3, 4e-3, 0.05])
+def test_a_command_acts_after_the_dead_time_however_long_a_step_is(step_s: float) -> None:
+    lag = Lag(Response(delay_s=0.005, lag_s=0.06))
+    lag.advance([0.0], [0.0], 0.0)
+    for index in range(round(0.2 / step_s)):
+        expected = lag.advance([1e5], [0.0], step_s)
+        passed_s = (index + 1) * step_s - 0.005
+        assert expected == pytest.approx([1e5 * (1.0 - exp(-max(0.0, passed_s) / 0.06))])
+
+
+def test_without_a_lag_the_pressure_is_there_when_the_dead_time_is_over() -> None:
+    lag = Lag(Response(delay_s=0.005, lag_s=0.0))
+    lag.advance([0.0], [0.0], 0.0)
+    assert lag.advance([1e5], [0.0], 0.004) == [0.0]
+    assert lag.advance([2e5], [0.0], 0.004) == [1e5]
+    assert lag.advance([2e5], [0.0], 0.004) == [2e5]
 
 
 def test_in_a_move_the_lag_may_be_wrong_by_its_uncertainty() -> None:
