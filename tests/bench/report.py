@@ -106,12 +106,12 @@ def _pair(row: dict[str, float], unit: str, digits: int = 2) -> str:
 
 
 def _steady(found: Results, case: str) -> str:
-    row = found["tracking"][case]
-    return f"{_pair(row['steady_mm'], 'mm')}, over {row['targets']} targets"
+    row = found["tracking"][case]["steady_mm"]
+    return f"{_pair(row, 'mm')}, over {row['number']} targets"
 
 
 def _lost(found: Results) -> str:
-    phases = found["tracking"]["calibrated_feedback"]["camera_lost"]
+    phases = found["tracking"]["calibrated"]["camera_lost"]
     return "; ".join(
         f"{name}: {row['tip_mm']:.3f} mm, {row['pressure_mbar']:.1f} mbar"
         for name, row in phases.items()
@@ -152,16 +152,16 @@ ROWS = (
     Row("tip at rest, calibrated, no feedback", "3 %, and a third of the above",
         lambda f: _calibrated(f, "after")),
     Row("with the tip measured: steady error", "0.3 mm median, 0.6 mm worst",
-        lambda f: _steady(f, "calibrated_feedback")),
-    Row("the same on an uncalibrated arm", "", lambda f: _steady(f, "uncalibrated_feedback")),
+        lambda f: _steady(f, "calibrated")),
+    Row("the same on an uncalibrated arm", "", lambda f: _steady(f, "uncalibrated")),
     Row("step of 50 mm, settled to 1 mm", "1 s median",
-        lambda f: _pair(f["tracking"]["calibrated_feedback"]["step_settled_s"], "s")),
+        lambda f: _pair(f["tracking"]["calibrated"]["step"]["settled_s"], "s")),
     Row("its overshoot", "5 %",
-        lambda f: _pair(f["tracking"]["calibrated_feedback"]["step_overshoot_percent"], "%", 1)),
+        lambda f: _pair(f["tracking"]["calibrated"]["step"]["overshoot_percent"], "%", 1)),
     Row("circle of radius 40 mm at 0.25 Hz, RMS", "1.5 mm",
-        lambda f: _pair(f["tracking"]["calibrated_feedback"]["circle_rms_mm"], "mm")),
-    Row("the same without the camera", "",
         lambda f: _pair(f["tracking"]["calibrated"]["circle_rms_mm"], "mm")),
+    Row("the same without the camera", "",
+        lambda f: _pair(f["tracking"]["calibrated_no_feedback"]["circle_rms_mm"], "mm")),
     Row("camera lost for 2 s in the circle: largest jump of the command in a tick", "", _lost),
     Row("Modbus TCP, one block write and one block read", "",
         lambda f: f"{f['modbus']['exchanges_per_s']:.0f} a second on loopback, "
