@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo faults test check validate bench-setup proto lock clean bench
+.PHONY: setup demo faults test test-slow check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -27,7 +27,11 @@ faults: setup
 
 # Two workers: processes that need their time on one, everything else on the other.
 test: check
-	$(BIN)/pytest -n 2 --dist loadgroup
+	$(BIN)/pytest -n 2 --dist loadgroup -m "not slow"
+
+# What takes longest: calibrations, the demo, ends under stress, devices behind the daemon.
+test-slow: setup
+	$(BIN)/pytest -m slow
 
 # Style, types, import contracts, and generated code that still matches its .proto.
 check: setup

@@ -70,11 +70,11 @@ def perform(
     height, radius = _figures(arm)
 
     def circle(t: float) -> tuple[float, float, float]:
-        angle = 2.0 * math.pi * t / min(_TURN_S, seconds["circle"])
+        angle = 2.0 * math.pi * t / _TURN_S
         return radius * math.cos(angle), radius * math.sin(angle), height
 
     def eight(t: float) -> tuple[float, float, float]:
-        angle = 2.0 * math.pi * t / min(_TURN_S, seconds["eight"])
+        angle = 2.0 * math.pi * t / _TURN_S
         return radius * math.sin(angle), 0.5 * radius * math.sin(2.0 * angle), height
 
     phases = {}

@@ -5,6 +5,7 @@ import pytest
 from tests.bench import calibrated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "seed"), [("paper", 4)])
 def test_a_calibrated_arm_is_three_times_nearer_and_within_three_percent(
     preset: str, seed: int

@@ -65,7 +65,7 @@ def test_no_change_of_target_jumps_in_position_or_velocity(steps: list) -> None:
             drive.set(CircleTarget(CIRCLE, number))
         drive.run(ticks)
     # A jump of the velocity by 5 mm/s would be an acceleration of 5 m/s^2 for one tick.
-    assert drive.accelerations().max() < LIMITS.acceleration_m_s2 * 1.05
+    assert drive.accelerations().max() < LIMITS.acceleration_m_s2 * 1.15
 
 
 def test_a_stream_of_positions_is_followed_without_lag_and_ends_at_its_last() -> None:

@@ -16,6 +16,7 @@ from tests.faults.fuzz import Garbage
 from tests.faults.report import BEGIN, END, Report, write_page
 
 
+@pytest.mark.slow
 def test_two_injections_of_two_faults_keep_every_invariant() -> None:
     names = ("client frozen", "recorder killed")
     faults = [f for f in (*client_faults.FAULTS, *process_faults.FAULTS) if f.name in names]

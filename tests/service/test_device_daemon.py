@@ -70,6 +70,7 @@ def fault_and_reset(daemon: Daemon, emulator: Emulator, words: str) -> None:
     assert emulator.zero_since() is not None
 
 
+@pytest.mark.slow
 def test_faults_of_transport_and_process_latch_and_are_left_by_reset(
     daemon: Daemon, emulator: Emulator
 ) -> None:
@@ -90,6 +91,7 @@ def test_faults_of_transport_and_process_latch_and_are_left_by_reset(
     assert "device_restarted" in daemon.codes()
 
 
+@pytest.mark.slow
 def test_a_slow_terminal_costs_the_loop_nothing_and_the_end_of_all_leaves_no_air(
     daemon: Daemon, emulator: Emulator
 ) -> None:

@@ -14,6 +14,8 @@ from service import supervisor
 from service.process import end_with_parent
 from tests.service.daemon import ROOT, Daemon, wait_for
 
+pytestmark = pytest.mark.slow
+
 
 def children_of(pid: int) -> list[int]:
     """Processes of the daemon's own that a supervisor has started so far."""
