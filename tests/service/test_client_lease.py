@@ -81,6 +81,17 @@ def test_second_client_is_refused_with_the_holders_name(daemon: Daemon, watcher:
         keep_moving(first, enough(0.2), "the first client goes on")
 
 
+def settled(watcher: Client) -> list[float]:
+    """Wait until what went ahead for the valves' lag has come back; return what is held."""
+
+    def held_pa() -> list[float]:
+        state = watcher.state()
+        sent = list(state.pressure_sent_pa)
+        return sent if sent == list(state.pressure_commanded_pa) else []
+
+    return wait_for(held_pa, "the held pressures")
+
+
 def test_taking_over_makes_the_arm_hold_and_shuts_the_first_out(
     daemon: Daemon, watcher: Client
 ) -> None:
@@ -91,7 +102,7 @@ def test_taking_over_makes_the_arm_hold_and_shuts_the_first_out(
         reply = watcher.take_lease(take_over=True)
         assert reply.lease_holder == watcher.client_id
         assert held(watcher).code == "lease_lost"
-        before = list(watcher.state().pressure_sent_pa)
+        before = settled(watcher)
         with pytest.raises(TargetRejected, match=f"has no lease; {watcher.client_id} has it"):
             wait_for(
                 lambda: first.send_position((0.0, 0.0, 0.2)) and first.raise_if_refused(),
@@ -120,7 +131,7 @@ def test_arm_holds_when_its_client_hangs(
     event = held(watcher)
     assert event.code == "target_stale"
     assert event.remedy
-    before = list(watcher.state().pressure_sent_pa)
+    before = settled(watcher)
     sender.send_signal(signal.SIGCONT)
     # What the program sends after its pause moves nothing: somebody has to arm again.
     number = watcher.state().sequence
