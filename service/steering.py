@@ -13,14 +13,7 @@ from controllers.dither import Dither
 from controllers.estimator import TipEstimate
 from controllers.feedback import FeedbackSettings, TipObserver, Verdict
 from controllers.follower import Follower, lead_of
-from controllers.targets import (
-    LengthsTarget,
-    PoseTarget,
-    PositionTarget,
-    PressuresTarget,
-    ShapeTarget,
-    Target,
-)
+from controllers.targets import PoseTarget, PositionTarget, PressuresTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
 from controllers.valve_lead import ValveLead
@@ -30,9 +23,6 @@ from service.commands import SetTarget, SetTipPose
 Tell = Callable[["pb.Level", str, str, str, str], None]
 
 _NONE = np.full(3, np.nan)
-
-#: Targets in which nothing is said of the tip: no measured one is followed.
-_OF_CHAMBERS = (LengthsTarget, PressuresTarget)
 
 #: The dither grows from nothing, and a share of the hysteresis or the lead from 0 to 1, in this
 #: time (s).
@@ -99,7 +89,13 @@ class Steering:
         self._controller.set_target(None)
 
     def start_from(self, pressures_pa: Array) -> None:
-        """Take the commanded lengths from pressures, without a target."""
+        """Take the commanded lengths from pressures, without a target.
+
+        The whole hysteresis is inverted from here on: a share that went up only afterwards would
+        move an arm to which nobody has said anything yet.
+        """
+        self._share = 1.0
+        self._controller.set_hysteresis_share(1.0)
         self._controller.start_from(pressures_pa)
         self._follower.forget()
         self._valves.forget()
@@ -160,11 +156,6 @@ class Steering:
         changes nothing.
         """
         if not self._follower.follows:
-            self._dither_since_s = None
-            self._share = 1.0
-            self._controller.set_hysteresis_share(1.0)
-            return 0.0
-        if isinstance(self._target, _OF_CHAMBERS):
             self._dither_since_s = None
             self._go_to_share(1.0)
             return 0.0

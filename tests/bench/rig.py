@@ -136,6 +136,14 @@ class Rig:
         self.tick(RequestMode(ModeEvent.ENABLE, 2, "bench"))
         return self
 
+    def rest(self, request: RequestMode, seconds: float) -> np.ndarray:
+        """Ask for a mode, and go on without any target; return the ticks."""
+        self._target, first = None, len(self._records)
+        self.tick(request)
+        for _ in range(round(seconds * 1e9 / self.period_ns)):
+            self.tick()
+        return self.ticks(first)
+
     def run(self, seconds: float, target: Target | None = None) -> np.ndarray:
         """Go on with a target, or with the one before; return the ticks."""
         self._target = target or self._target

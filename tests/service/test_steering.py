@@ -6,8 +6,11 @@ import pytest
 from controllers.estimator import EstimateSource
 from controllers.shapes import Circle
 from controllers.targets import LengthsTarget, PressuresTarget
+from service.commands import RequestMode
+from service.mode import Mode, ModeEvent
 from tests.bench.rig import Rig
 from tests.service.simulated import configuration_of
+from tests.service.test_loop_calibrated import calibrated_configuration
 
 HOME = np.array([0.0, 0.0, 0.2])
 CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
@@ -75,6 +78,20 @@ def test_targets_without_a_reference_pass_it_by(rig: Rig) -> None:
     again = rig.to(HOME, 0.02)
     jump = np.linalg.norm(np.diff(again["tip_commanded_position_m"], axis=0), axis=1).max()
     assert jump < 1e-3
+
+
+def test_arming_again_after_feedback_does_not_move_the_tip() -> None:
+    rig = Rig(calibrated_configuration()).activate()
+    rig.to(np.array([0.03, 0.01, 0.2]), 3.0)
+    rig.rest(RequestMode(ModeEvent.HOLD, 2, "bench"), 0.6)
+    held = rig.ticks()[-1]
+    armed = rig.rest(RequestMode(ModeEvent.ENABLE, 4, "bench"), 1.0)
+    assert armed["mode"][-1] == Mode.ACTIVE
+    assert armed["pressure_sent_pa"] == pytest.approx(
+        np.broadcast_to(held["pressure_sent_pa"], armed["pressure_sent_pa"].shape), abs=1.0
+    )
+    moved = np.linalg.norm(armed["tip_true_position_m"] - held["tip_true_position_m"], axis=1)
+    assert moved.max() < 1e-3
 
 
 def test_pressures_are_sent_without_lead_or_dither(rig: Rig) -> None:
