@@ -1,18 +1,37 @@
 """The watchdog inside an emulated terminal, with both fail-safe settings."""
 
 from hardware.emulation import EmulatedArm
+from hardware.modbus import milliseconds_to_registers
+from hardware.terminal_watchdog import TerminalWatchdog
 
 
 class EmulatedWatchdog:
     """Zeroes the arm, or with ``hold`` only says so, when the host has been silent for too long.
 
-    It begins with the first request of a host, as in the terminals.
+    It begins with the first request of a host, as in the terminals. Its registers are where
+    ``where`` says.
     """
 
-    def __init__(self, arm: EmulatedArm, timeout_ms: int, hold: bool) -> None:
-        self._arm, self._hold = arm, hold
-        self.timeout_ms = timeout_ms
+    def __init__(self, arm: EmulatedArm, where: TerminalWatchdog, hold: bool) -> None:
+        self._arm, self._where, self._hold = arm, where, hold
+        self.timeout_ms = where.timeout_ms
         self._touched_s: float | None = None
+
+    def registers(self) -> dict[int, int]:
+        """Its time and, where there is one, its fail-safe setting, by register."""
+        where = self._where
+        words = milliseconds_to_registers(self.timeout_ms, where.words)
+        found = {where.register + index: word for index, word in enumerate(words)}
+        if where.failsafe_register is not None:
+            found[where.failsafe_register] = int(self._hold)
+        return found
+
+    def takes(self, address: int, values: list[int]) -> bool:
+        """Take its time; False where these are registers of something else."""
+        if address != self._where.register or len(values) != self._where.words:
+            return False
+        self.timeout_ms = sum(value << (16 * index) for index, value in enumerate(values))
+        return True
 
     def touched(self, now_s: float) -> None:
         """The host has asked for something."""

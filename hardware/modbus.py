@@ -70,6 +70,15 @@ class ModbusTerminal:
             raise self._lost(f"answered {what} with something else")
         return registers
 
+    def read_wired(self, block: tuple[int, int], wired: str) -> list[int]:
+        """Return a block, as :meth:`read`; where it is not there, ask whether ``wired`` is."""
+        try:
+            return self.read(*block)
+        except HardwareError as error:
+            if "exception 2" not in str(error):
+                raise
+            raise HardwareError(f"{error}: does the terminal have {wired}?") from error
+
     def write(self, address: int, values: list[int]) -> None:
         """Set holding registers from ``address`` on, function 16."""
         client = self._open()

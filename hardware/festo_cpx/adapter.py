@@ -115,15 +115,11 @@ class FestoCpx:
 
     def _read_inputs(self) -> CpxInputs:
         layout = self._settings.layout
-        try:
-            return layout.decode(self._terminal.read(*layout.input_block))
-        except HardwareError as error:
-            if "exception 2" not in str(error):
-                raise
-            raise HardwareError(
-                f"{error}: does the terminal have {len(layout.valves)} valves at "
-                f"{NAME}.input_base = {layout.input_base}, one for every chamber?"
-            ) from error
+        wired = (
+            f"{len(layout.valves)} valves at {NAME}.input_base = {layout.input_base}, one for "
+            "every chamber"
+        )
+        return layout.decode(self._terminal.read_wired(layout.input_block, wired))
 
     def _check_setpoints(self, inputs: CpxInputs) -> None:
         """Raise where the terminal has long shown a setpoint that none of our writes was."""

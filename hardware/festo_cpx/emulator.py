@@ -5,11 +5,30 @@ import numpy as np
 from hardware.emulated_watchdog import EmulatedWatchdog
 from hardware.emulation import EmulatedArm
 from hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
-from hardware.modbus import from_signed, milliseconds_to_registers, to_signed
+from hardware.modbus import from_signed, to_signed
 from hardware.terminal_watchdog import TerminalWatchdog
 
 #: The terminal's first valve is fed by this much at most, counts of 1 mbar.
 _LARGEST_COUNT = 10_000
+
+
+def read_from(found: dict[int, int], address: int, count: int) -> list[int] | None:
+    """Return registers out of those that a terminal has, None where one is not there."""
+    wanted = range(address, address + count)
+    if not all(number in found for number in wanted):
+        return None
+    return [from_signed(found[number]) for number in wanted]
+
+
+def measured_counts(arm: EmulatedArm, valves: tuple[int, ...], valve: int) -> int:
+    """Counts that a valve measures; what is no number reads as the lowest, as of a broken sensor.
+
+    ``valves`` names the valve of every chamber; one that moves none measures zero.
+    """
+    if valve not in valves:
+        return 0
+    measured_pa = arm.pressures_pa.reshape(-1)[valves.index(valve)]
+    return -32768 if np.isnan(measured_pa) else round(float(measured_pa) / COUNT_PA)
 
 
 class EmulatedCpx:
@@ -23,11 +42,10 @@ class EmulatedCpx:
         hold: bool = False,
         n_valves: int | None = None,
     ) -> None:
-        self._arm, self._layout, self._where = arm, layout, watchdog
-        self._watchdog = EmulatedWatchdog(arm, watchdog.timeout_ms, hold)
+        self._arm, self._layout = arm, layout
+        self._watchdog = EmulatedWatchdog(arm, watchdog, hold)
         n_valves = max(layout.valves) + 1 if n_valves is None else n_valves
         self._counts = [0] * n_valves
-        self._failsafe = int(hold)
 
     def touched(self, now_s: float) -> None:
         """Somebody has asked for something."""
@@ -41,37 +59,22 @@ class EmulatedCpx:
 
     def read(self, address: int, count: int) -> list[int] | None:
         """Return registers, None where one of them is not there."""
-        found = self._registers()
-        wanted = range(address, address + count)
-        if not all(number in found for number in wanted):
-            return None
-        return [from_signed(found[number]) for number in wanted]
+        return read_from(self._registers() | self._watchdog.registers(), address, count)
 
     def _registers(self) -> dict[int, int]:
-        layout, where = self._layout, self._where
+        layout = self._layout
         found: dict[int, int] = {}
         for valve, count in enumerate(self._counts):
             found[layout.output_base + layout.output_stride * valve] = count
             first = layout.input_base + layout.input_stride * valve
-            found |= {first: self._actual(valve), first + 1: count, first + 2: 0}
-        registers = milliseconds_to_registers(self._watchdog.timeout_ms, where.words)
-        found |= {where.register + index: word for index, word in enumerate(registers)}
-        if where.failsafe_register is not None:
-            found[where.failsafe_register] = self._failsafe
+            actual = measured_counts(self._arm, layout.valves, valve)
+            found |= {first: actual, first + 1: count, first + 2: 0}
         return found
-
-    def _actual(self, valve: int) -> int:
-        """Measured counts; what is no number reads as the lowest, as of a broken sensor."""
-        if valve not in self._layout.valves:
-            return 0
-        measured_pa = self._arm.pressures_pa.reshape(-1)[self._layout.valves.index(valve)]
-        return -32768 if np.isnan(measured_pa) else round(float(measured_pa) / COUNT_PA)
 
     def write(self, address: int, values: list[int], now_s: float) -> bool:
         """Take setpoints, or the watchdog's time; False where a register is not there."""
-        where, layout = self._where, self._layout
-        if address == where.register and len(values) == where.words:
-            self._watchdog.timeout_ms = sum(v << (16 * i) for i, v in enumerate(values))
+        layout = self._layout
+        if self._watchdog.takes(address, values):
             return True
         outputs = {
             layout.output_base + layout.output_stride * valve: valve

@@ -148,12 +148,8 @@ class FestoVtem:
 
     def _inputs(self) -> VtemInputs:
         layout = self._settings.layout
-        try:
-            return layout.decode(self._terminal.read(*layout.input_block))
-        except HardwareError as error:
-            if "exception 2" not in str(error):
-                raise
-            raise HardwareError(
-                f"{error}: does the terminal have {len(layout.slots)} slots at "
-                f"{NAME}.input_base = {layout.input_base}, one for every two valves?"
-            ) from error
+        wired = (
+            f"{len(layout.slots)} slots at {NAME}.input_base = {layout.input_base}, one for every "
+            "two valves"
+        )
+        return layout.decode(self._terminal.read_wired(layout.input_block, wired))

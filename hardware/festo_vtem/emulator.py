@@ -6,6 +6,7 @@ import numpy as np
 
 from hardware.emulated_watchdog import EmulatedWatchdog
 from hardware.emulation import EmulatedArm
+from hardware.festo_cpx.emulator import measured_counts, read_from
 from hardware.festo_cpx.protocol import COUNT_PA
 from hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
@@ -18,7 +19,7 @@ from hardware.festo_vtem.protocol import (
     VtemLayout,
     command_word,
 )
-from hardware.modbus import from_signed, milliseconds_to_registers, to_signed
+from hardware.modbus import to_signed
 from hardware.terminal_watchdog import TerminalWatchdog
 
 #: How long a slot takes to load pressure regulation.
@@ -65,10 +66,9 @@ class EmulatedVtem:
         hold: bool = False,
         n_slots: int | None = None,
     ) -> None:
-        self._arm, self._layout, self._where = arm, layout, watchdog
-        self._watchdog = EmulatedWatchdog(arm, watchdog.timeout_ms, hold)
+        self._arm, self._layout = arm, layout
+        self._watchdog = EmulatedWatchdog(arm, watchdog, hold)
         self._slots = [_Slot() for _ in range(n_slots or layout.slots[-1] + 1)]
-        self._failsafe = int(hold)
 
     def touched(self, now_s: float) -> None:
         """Somebody has asked for something."""
@@ -83,38 +83,22 @@ class EmulatedVtem:
 
     def read(self, address: int, count: int) -> list[int] | None:
         """Return registers, None where one of them is not there."""
-        found, where = self._inputs(), self._where
-        registers = milliseconds_to_registers(self._watchdog.timeout_ms, where.words)
-        found |= {where.register + index: word for index, word in enumerate(registers)}
-        if where.failsafe_register is not None:
-            found[where.failsafe_register] = self._failsafe
-        wanted = range(address, address + count)
-        if not all(number in found for number in wanted):
-            return None
-        return [from_signed(found[number]) for number in wanted]
+        return read_from(self._inputs() | self._watchdog.registers(), address, count)
 
     def _inputs(self) -> dict[int, int]:
         layout, found = self._layout, {}
         for number, slot in enumerate(self._slots):
             first = layout.input_base + layout.input_stride * number
             found[first] = command_word(slot.app, slot.state)
-            found[first + 1], found[first + 2] = (
-                self._actual(2 * number),
-                self._actual(2 * number + 1),
-            )
+            for index in range(2):
+                actual = measured_counts(self._arm, layout.valves, 2 * number + index)
+                found[first + 1 + index] = actual
         return found
-
-    def _actual(self, valve: int) -> int:
-        if valve not in self._layout.valves:
-            return 0
-        measured_pa = self._arm.pressures_pa.reshape(-1)[self._layout.valves.index(valve)]
-        return -32768 if np.isnan(measured_pa) else round(float(measured_pa) / COUNT_PA)
 
     def write(self, address: int, values: list[int], now_s: float) -> bool:
         """Take whole slots, or the watchdog's time; False for anything else."""
-        where, layout = self._where, self._layout
-        if address == where.register and len(values) == where.words:
-            self._watchdog.timeout_ms = sum(v << (16 * i) for i, v in enumerate(values))
+        layout = self._layout
+        if self._watchdog.takes(address, values):
             return True
         first, rest = divmod(address - layout.output_base, layout.output_stride)
         count, odd = divmod(len(values), layout.output_stride)
