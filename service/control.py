@@ -45,22 +45,13 @@ class ControlProcess:
             if shared.device is None
             else LinkedDevice(shared.device)
         )
-        settings = LoopSettings(
-            period_s=1.0 / control.rate_hz,
-            control=control.settings(),
-            reference=configuration.reference.limits(),
-            feedback=configuration.feedback.settings(),
-            timeouts=Timeouts(
-                target_s=control.target_timeout_ms * 1e-3,
-                arming_s=control.arming_timeout_s,
-                hold_s=control.hold_timeout_s,
-                full_disk_vent_s=configuration.log.full_disk_vent_s,
-            ),
-            monitors=configuration.monitors.settings(),
-            supply_flow_max_pa_s=configuration.hardware.supply_flow_limit_pa_s,
-            start_ns=shared.start_ns,
-            start_unix_ns=shared.start_unix_ns,
+        timeouts = Timeouts(
+            target_s=control.target_timeout_ms * 1e-3,
+            arming_s=control.arming_timeout_s,
+            hold_s=control.hold_timeout_s,
+            full_disk_vent_s=configuration.log.full_disk_vent_s,
         )
+        settings = LoopSettings.of(configuration, timeouts, shared.start_ns, shared.start_unix_ns)
         self._loop = Loop(arm, settings, self._hardware, self._emit)
         self._ending_since_ns: int | None = None
 

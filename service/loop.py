@@ -31,6 +31,7 @@ from service.commands import (
     SetTarget,
     SetTipPose,
 )
+from service.config import Configuration
 from service.device_link import LinkedDevice
 from service.mode import VENTED_MODES, Mode, ModeEvent
 from service.mode_keeper import ModeKeeper, Timeouts, Watched
@@ -64,6 +65,23 @@ class LoopSettings:
     supply_flow_max_pa_s: float = inf
     reference: ReferenceLimits = field(default_factory=ReferenceLimits)
     feedback: FeedbackSettings = field(default_factory=FeedbackSettings)
+
+    @classmethod
+    def of(
+        cls, configuration: Configuration, timeouts: Timeouts, start_ns: int, start_unix_ns: int
+    ) -> "LoopSettings":
+        """Return what a configuration says; the timeouts are the caller's."""
+        return cls(
+            period_s=1.0 / configuration.control.rate_hz,
+            control=configuration.control.settings(),
+            timeouts=timeouts,
+            monitors=configuration.monitors.settings(),
+            start_ns=start_ns,
+            start_unix_ns=start_unix_ns,
+            supply_flow_max_pa_s=configuration.hardware.supply_flow_limit_pa_s,
+            reference=configuration.reference.limits(),
+            feedback=configuration.feedback.settings(),
+        )
 
 
 @dataclass(frozen=True)
@@ -198,6 +216,7 @@ class Loop:
         now_s = self._now_ns * 1e-9
         self._tick["pressure_measured_pa"] = np.nan  # a record of a failed reading shows no old one
         self._tick["supply_pa"] = self._tick["measurement_age_s"] = np.nan
+        self._tick["tip_commanded_position_m"] = np.nan
         try:
             measurement = self._hardware.read(now_s)
             self._tick["pressure_measured_pa"] = measurement.pressures_pa
@@ -207,8 +226,9 @@ class Loop:
         sent = self._hardware.sent_pa
         self._safety.look(measurement, self._tick, self._tip_pose, sent, self._now_ns, dt_s)
         self._watch(now_s, disk)
-        wanted = self._control(dt_s, now_s)
-        self._send(wanted, now_s)
+        ramping = self._safety.ramping_pa(now_s)
+        wanted = self._control(dt_s, now_s) if ramping is None else ramping
+        self._send(wanted, now_s, ramping is not None)
         self._steering.observe(self._keeper.mode in VENTED_MODES)
         self._fill(measurement, wanted)
 
@@ -278,10 +298,6 @@ class Loop:
             self._tick["tip_commanded_position_m"] = self._steering.tip_m
             setpoints = self._steering.sent_pa(wanted, dt_s, now_s)
             return self._kept(wanted, setpoints)
-        self._tick["tip_commanded_position_m"] = np.nan
-        ramping = self._safety.ramping_pa(self._now_ns * 1e-9)
-        if ramping is not None:
-            return ramping
         if self._keeper.mode == Mode.HOLD:
             return self._wanted  # what the chambers have or are about to have, without any lead
         return self._sent  # in the vented modes it is zero already
@@ -308,8 +324,7 @@ class Loop:
             )
             self._told_fallbacks, self._tell_again_ns = count, now_ns + _TELL_EVERY_NS
 
-    def _send(self, wanted: Array, now_s: float) -> None:
-        ramping = self._safety.ramping_pa(now_s) is not None
+    def _send(self, wanted: Array, now_s: float, ramping: bool) -> None:
         if self._keeper.mode in VENTED_MODES and not ramping:
             self._hardware.vent(now_s)
             self._sent = np.zeros_like(self._sent)

@@ -41,14 +41,9 @@ class _Run:
         self.arm = configuration.build_arm()
         device = backends.build(configuration, self.arm)
         device.connect()
-        settings = LoopSettings(
-            period_s=1e-9 * _PERIOD_NS,
-            control=configuration.control.settings(),
-            timeouts=_FOREVER,
-            monitors=configuration.monitors.settings(),
-            start_ns=0,
-            start_unix_ns=time.time_ns(),
-        )
+        control = configuration.control.model_copy(update={"rate_hz": 1e9 / _PERIOD_NS})
+        slower = configuration.model_copy(update={"control": control})
+        settings = LoopSettings.of(slower, _FOREVER, 0, time.time_ns())
         self._loop = Loop(self.arm, settings, device, self._ignore)
         self._loop.warm_up()
         self._dtype = tick_dtype(self.arm.n_sections)

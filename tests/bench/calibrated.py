@@ -11,7 +11,6 @@ Then random position targets within reach, 3 s each, and the mean of the true ti
 import argparse
 import json
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,53 +19,22 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from controllers.arm import Array
-from controllers.calibration.calibrate import calibrate
-from controllers.calibration.plan import Move, plan
-from controllers.calibration.recording import Recording
 from controllers.controller import Reach
 from controllers.kinematics.constant_curvature import tip_transform
-from controllers.targets import PositionTarget, PressuresTarget
-from service.calibration.files import calibrated
+from controllers.targets import PositionTarget
+from service.calibration.simulated import calibrate_simulated
 from service.config import Configuration
 from tests.arms import random_lengths
 from tests.service.simulated import Bench, configuration_of
 
 RATE_HZ = 250.0
-REFRESH_S, SAMPLE_S = 0.02, 0.01
-NOISE_M = 1e-4
 #: Targets: how much of the way to each limit, how many, how long, averaged over what.
 SHARE, TARGETS, SECONDS, AVERAGED_S = 0.5, 15, 3.0, 0.4
 
 
-def record(bench: Bench, moves: Sequence[Move], seed: int) -> Recording:
-    """Go through the moves with an active bench, as the command's client does."""
-    rng = np.random.default_rng([seed, 7])
-    start, rows, number = np.zeros((bench.arm.n_sections, 3)), [], 0
-    refresh = round(REFRESH_S * 1e9 / bench.period_ns)
-    sample = round(SAMPLE_S * 1e9 / bench.period_ns)
-    for move in moves:
-        began_s = bench.now_s
-        while (elapsed_s := bench.now_s - began_s) < move.duration_s:
-            target = PressuresTarget(move.at(start, elapsed_s))
-            commands = (bench.target(target),) if number % refresh == 0 else ()
-            tick = bench.tick(*commands)
-            if number % sample == 0:
-                sent, measured = tick["pressure_sent_pa"], tick["pressure_measured_pa"]
-                tip = tick["tip_true_position_m"] + rng.normal(0.0, NOISE_M, 3)
-                rows.append((bench.now_s, sent.copy(), measured.copy(), tip))
-            bench.records.clear()
-            number += 1
-        start = move.pressures_pa
-    time_s, sent_pa, measured_pa, tip_m = (np.array(column) for column in zip(*rows, strict=True))
-    return Recording(time_s, sent_pa, measured_pa, tip_m)
-
-
 def calibrated_arm(preset: str, seed: int) -> Configuration:
     """Calibrate a simulated arm; the configuration holds the result, and still simulates it."""
-    configuration = configuration_of(preset, RATE_HZ, seed)
-    bench = Bench(configuration=configuration).activate()
-    recording = record(bench, plan(bench.arm), seed)
-    return calibrated(configuration, calibrate(bench.arm, recording))
+    return calibrate_simulated(configuration_of(preset, RATE_HZ, seed))
 
 
 def tip_errors_percent(configuration: Configuration, targets: Array) -> Array:

@@ -5,11 +5,9 @@ from collections import deque
 import numpy as np
 
 from controllers.arm import Array
-from controllers.feedback import FeedbackSettings
 from controllers.shapes import Shape
 from controllers.targets import CircleTarget, PositionTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation
-from controllers.trajectory import ReferenceLimits
 from hardware.interface import Hardware, Measurement
 from logs.schema import pneuarm_pb2 as pb
 from logs.status import Disk
@@ -63,8 +61,6 @@ class Rig:
         self,
         configuration: Configuration,
         *,
-        feedback: FeedbackSettings | None = None,
-        reference: ReferenceLimits | None = None,
         camera: bool = True,
         camera_hz: float = 100.0,
         delay_s: float = 0.01,
@@ -75,16 +71,7 @@ class Rig:
         self.period_ns = round(1e9 / rate_hz)
         self.hardware = Seen(backends.build(configuration, self.arm))
         self.events: list[pb.Event] = []
-        settings = LoopSettings(
-            period_s=1.0 / rate_hz,
-            control=configuration.control.settings(),
-            timeouts=_TIMEOUTS,
-            monitors=configuration.monitors.settings(),
-            start_ns=_START_NS,
-            start_unix_ns=_START_NS,
-            reference=reference or configuration.reference.limits(),
-            feedback=feedback or configuration.feedback.settings(),
-        )
+        settings = LoopSettings.of(configuration, _TIMEOUTS, _START_NS, _START_NS)
         self.hardware.connect()
         self.loop = Loop(self.arm, settings, self.hardware, self.events.append)
         self.now_ns = _START_NS

@@ -1,7 +1,7 @@
 """The control loop on simulated time: no clock, no sleeping, every write to the device seen."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
@@ -85,15 +85,8 @@ class Bench:
         self.hardware = Watched(backends.build(self.configuration, self.arm))
         self.events: list[pb.Event] = []
         self.period_ns = round(1e9 / rate_hz)
-        settings = LoopSettings(
-            period_s=1.0 / rate_hz,
-            control=self.configuration.control.settings(),
-            timeouts=TIMEOUTS,
-            monitors=self.configuration.monitors.settings(),
-            supply_flow_max_pa_s=supply_flow_max_bar_s * 1e5,
-            start_ns=START_NS,
-            start_unix_ns=START_UNIX_NS,
-        )
+        settings = LoopSettings.of(self.configuration, TIMEOUTS, START_NS, START_UNIX_NS)
+        settings = replace(settings, supply_flow_max_pa_s=supply_flow_max_bar_s * 1e5)
         self.hardware.connect()
         self.loop = Loop(self.arm, settings, self.hardware, self.events.append)
         self.now_ns = START_NS
