@@ -160,17 +160,26 @@ class Follower:
         given = target.velocity_m_s if isinstance(target, PositionTarget) else None
         return streamed if given is None else given
 
+    def _is_repeated(self, target: PositionTarget | PoseTarget, velocity: Array) -> bool:
+        """Whether the reference stands at this target, or is on its way to it, already."""
+        known = self._target
+        if self._moving_goal or velocity.any():
+            return False
+        if isinstance(target, PoseTarget):
+            return (
+                isinstance(known, PoseTarget)
+                and bool((known.position_m == target.position_m).all())
+                and bool((known.quaternion_xyzw == target.quaternion_xyzw).all())
+            )
+        return isinstance(known, PositionTarget) and bool(
+            (known.position_m == target.position_m).all()
+        )
+
     def _set_position(
         self, target: PositionTarget, at_s: float, tip: TipState, velocity_m_s: Array
     ) -> None:
-        velocity, known = self._velocity(target, at_s), self._target
-        repeated = (
-            isinstance(known, PositionTarget)
-            and not self._moving_goal
-            and not velocity.any()
-            and bool((known.position_m == target.position_m).all())
-        )
-        if repeated:
+        velocity = self._velocity(target, at_s)
+        if self._is_repeated(target, velocity):
             return
         self._start_position(tip, velocity_m_s)
         goal = _passing(target.position_m.tolist(), velocity.tolist())
@@ -179,15 +188,8 @@ class Follower:
     def _set_pose(
         self, target: PoseTarget, at_s: float, tip: TipState, velocity_m_s: Array
     ) -> None:
-        velocity, known = self._velocity(target, at_s), self._target
-        repeated = (
-            isinstance(known, PoseTarget)
-            and not self._moving_goal
-            and not velocity.any()
-            and bool((known.position_m == target.position_m).all())
-            and bool((known.quaternion_xyzw == target.quaternion_xyzw).all())
-        )
-        if repeated:
+        velocity = self._velocity(target, at_s)
+        if self._is_repeated(target, velocity):
             return
         turned = self._start_pose(tip, velocity_m_s)
         wanted = rotation_from_quaternion(target.quaternion_xyzw)

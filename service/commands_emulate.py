@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from controllers.errors import InvalidInput
+from hardware.emulation import DeviceRecord, EmulatedArm
 from service.config import PRESETS, Configuration, load
 
 #: What can be emulated -> "module:function" of ``(arguments, configuration) -> exit status``.
@@ -24,6 +25,15 @@ def emulate(arguments: argparse.Namespace) -> int:
     module, _, function = EMULATORS[arguments.what].partition(":")
     emulator: Emulator = getattr(importlib.import_module(module), function)
     return emulator(arguments, configuration_of(arguments.arm))
+
+
+def emulated_arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
+    """Make the arm behind an emulator; raises InvalidInput where its record cannot be kept."""
+    try:
+        record = None if arguments.record is None else DeviceRecord(arguments.record)
+    except OSError as error:
+        raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
+    return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
 
 
 def configuration_of(arm: str) -> Configuration:

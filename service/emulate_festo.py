@@ -6,14 +6,15 @@ import signal
 import time
 from dataclasses import replace
 
-from controllers.errors import ConfigurationError, InvalidInput
-from hardware.emulation import DeviceRecord, EmulatedArm
+from controllers.errors import ConfigurationError
+from hardware.emulation import EmulatedArm
 from hardware.festo_cpx.emulator import EmulatedCpx
 from hardware.festo_vtem.emulator import EmulatedVtem
 from hardware.modbus_server import EmulatedTerminal, ModbusServer
 from hardware.terminal_watchdog import TerminalWatchdog
 from hardware.transport_faults import ALL_WORDS, TransportFaults, start_console
 from service import festo, realtime
+from service.commands_emulate import emulated_arm
 from service.config import Configuration
 from service.tables.festo import FestoConfig
 
@@ -23,7 +24,7 @@ _HOST = "127.0.0.1"
 def cpx(arguments: argparse.Namespace, configuration: Configuration) -> int:
     """Emulate a CPX terminal."""
     table, arm = configuration.festo_cpx, configuration.build_arm()
-    emulated = _arm(arguments, configuration)
+    emulated = emulated_arm(arguments, configuration)
     where = festo.cpx_layout(table, arm)
     hold = arguments.fail_safe == "hold"
     terminal = EmulatedCpx(emulated, where, _watchdog(arguments, table), hold)
@@ -33,19 +34,11 @@ def cpx(arguments: argparse.Namespace, configuration: Configuration) -> int:
 def vtem(arguments: argparse.Namespace, configuration: Configuration) -> int:
     """Emulate a VTEM."""
     table, arm = configuration.festo_vtem, configuration.build_arm()
-    emulated = _arm(arguments, configuration)
+    emulated = emulated_arm(arguments, configuration)
     where = festo.vtem_layout(table, arm)
     hold = arguments.fail_safe == "hold"
     terminal = EmulatedVtem(emulated, where, _watchdog(arguments, table), hold)
     return _serve("festo-vtem", arguments, configuration, terminal, emulated)
-
-
-def _arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
-    try:
-        record = None if arguments.record is None else DeviceRecord(arguments.record)
-    except OSError as error:
-        raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
-    return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
 
 
 def _watchdog(arguments: argparse.Namespace, table: FestoConfig) -> TerminalWatchdog:

@@ -5,17 +5,18 @@ import signal
 import threading
 import time
 
-from controllers.errors import ConfigurationError, InvalidInput
+from controllers.errors import ConfigurationError
 from hardware.channels import Channels
 from hardware.ctrl_p.emulator import CtrlPEmulator
 from hardware.emulated_faults import PHYSICAL_WORDS
-from hardware.emulation import DeviceRecord, EmulatedArm
+from hardware.emulation import EmulatedArm
 from hardware.esp32.emulator import Esp32Emulator
 from hardware.esp32.protocol import CHAMBERS
 from hardware.pseudo_terminal import PseudoTerminal, SerialEmulator
 from hardware.serial_faults import SERIAL_WORDS, SerialFaults
 from hardware.transport_faults import start_console
 from service import serial_devices
+from service.commands_emulate import emulated_arm
 from service.config import Configuration
 
 
@@ -24,7 +25,7 @@ def ctrl_p(arguments: argparse.Namespace, configuration: Configuration) -> int:
     table, arm = configuration.ctrl_p, configuration.build_arm()
     valves = serial_devices.valves(table, arm)
     channels = Channels(arm, table.channels, valves, "[ctrl_p] valves")
-    emulated = _arm(arguments, configuration)
+    emulated = emulated_arm(arguments, configuration)
     lines = [f"channels = {table.channels}", f"valves = {list(valves)}"]
     lines.append(f"ceiling_bar = {_ceiling_bar(configuration):g}")
     return _serve("ctrl-p", configuration, CtrlPEmulator(emulated, channels), emulated, lines)
@@ -40,7 +41,7 @@ def esp32(arguments: argparse.Namespace, configuration: Configuration) -> int:
         )
     valves = serial_devices.valves(table, arm)
     channels = Channels(arm, CHAMBERS, valves, "[esp32] valves")
-    emulated = _arm(arguments, configuration)
+    emulated = emulated_arm(arguments, configuration)
     rows = [[valve + 1, valve + 1 + CHAMBERS] for valve in valves]
     lines = [f"valves = {list(valves)}", f"potentiometers = {rows}"]
     return _serve("esp32", configuration, Esp32Emulator(emulated, channels), emulated, lines)
@@ -50,14 +51,6 @@ def _ceiling_bar(configuration: Configuration) -> float:
     """Return the configured ceiling, or one that the arm's largest pressure stays below."""
     largest = max(section.pressure_max_bar for section in configuration.arm.sections)
     return max(configuration.ctrl_p.ceiling_bar, 1.25 * largest)
-
-
-def _arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
-    try:
-        record = None if arguments.record is None else DeviceRecord(arguments.record)
-    except OSError as error:
-        raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
-    return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
 
 
 def _serve(

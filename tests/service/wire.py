@@ -66,8 +66,13 @@ class Wire:
         )
 
     def put(self, key: str, payload: bytes, encoding: str = PROTOBUF) -> None:
-        """Put a payload."""
-        self.session.put(self.key(key), payload, encoding=encoding)
+        """Put a payload; a large one waits until it is taken instead of being dropped."""
+        self.session.put(
+            self.key(key),
+            payload,
+            encoding=encoding,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+        )
 
     def ask(self, key: str, payload: bytes | None, encoding: str) -> zenoh.Sample:
         """Query a key and return the one answer."""
