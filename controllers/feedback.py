@@ -44,8 +44,8 @@ class FeedbackSettings:
     enabled: bool = True
     delay_s: float = 0.01
     timeout_s: float = 0.1
-    time_constant_s: float = 0.2
-    rate_max_m_s: float = 0.1
+    time_constant_s: float = 0.17
+    rate_max_m_s: float = 0.05
     deadband_m: float = 1e-4
     jump_max_m: float = 0.02
     jump_accept_s: float = 0.5
@@ -53,8 +53,8 @@ class FeedbackSettings:
     length_sigma_m: float = 0.01
     dither_pa: float = 1500.0
     dither_period_s: float = 0.03
-    hysteresis_share: float = 0.35
-    hysteresis_share_moving: float = 0.5
+    hysteresis_share: float = 0.55
+    hysteresis_share_moving: float = 0.6
 
 
 class Verdict(Enum):

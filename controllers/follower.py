@@ -1,20 +1,22 @@
 """From targets to what the law is given in every tick: the reference, and the lead before the arm.
 
 A new target never jumps: the reference goes on from where and how fast it is. The arm answers late,
-so the law is told where the reference will be when the air and the body have followed: the inverse
-of the response's lag and mode,
+so the reference runs ahead of the tip by the dead time and the lag, and the law is told what the
+body must be given to be there: the inverse of the lowest mode,
 
-    u = r + (delay + lag + 2 zeta / omega) r' + (1 / omega^2 + 2 zeta lag / omega) r''
+    u = r + (2 zeta / omega) r' + (1 / omega^2) r''
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from controllers.arm import Array, Response
-from controllers.frames import rotation_from_vector, rotation_vector
+from controllers.frames import rotation_from_vector, rotation_vector, spin_of
 from controllers.kinematics.compiled import TipState
+from controllers.stream import STREAM_S, Stream
 from controllers.targets import PoseTarget, PositionTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import (
     quaternion_from_rotation,
@@ -25,63 +27,39 @@ from controllers.trajectory import Goal, Motion, Reference, ReferenceLimits, sta
 #: One metre of the limits allows this many radians.
 _TURN_PER_M = 10.0
 
-#: Positions that arrive this close together (s) and move are a stream; without the next one for
-#: as long, the reference goes to the last one and stands.
-_STREAM_S = 0.1
-
-#: Share of the newest step in the speed of a stream: arrival times jitter.
-_NEWEST = 0.4
-
 #: Where the law is this far (m) behind, the arm cannot follow: a new target starts at the tip.
 _LOST_M = 0.02
 
 
 @dataclass(frozen=True)
 class Lead:
-    """How much of the reference's velocity (s) and acceleration (s^2) the command goes ahead."""
+    """By how much (s) the reference runs ahead of the tip, and the inverse of the mode.
 
+    That is how much of the reference's velocity (s) and acceleration (s^2) the command goes ahead.
+    """
+
+    ahead_s: float = 0.0
     velocity_s: float = 0.0
     acceleration_s2: float = 0.0
 
 
 def lead_of(response: Response) -> Lead:
-    """Return the lead that undoes dead time, lag and mode, to second order."""
+    """Return the lead that undoes dead time, lag and mode.
+
+    A lag that is short beside the mode is as good as a dead time; undone as a lag, it would ask for
+    steps wherever the jerk has one.
+    """
     omega = 2.0 * math.pi * response.mode_hz
-    swing_s = 2.0 * response.damping_ratio / omega
-    return Lead(response.delay_s + response.lag_s + swing_s, omega**-2 + swing_s * response.lag_s)
-
-
-class _Stream:
-    """The speed of positions that arrive one after another."""
-
-    def __init__(self) -> None:
-        self.forget()
-
-    def forget(self) -> None:
-        self._position: Array | None = None
-        self._at_s = 0.0
-        self._velocity: Array | None = None
-
-    def velocity(self, position_m: Array, at_s: float, largest_m_s: float) -> Array:
-        """Speed (3,) of a stream; zero for a position that is repeated or stands alone."""
-        before, pause_s = self._position, at_s - self._at_s
-        self._position, self._at_s = position_m, at_s
-        if before is None or not 0.0 < pause_s <= _STREAM_S:
-            self._velocity = None
-            return np.zeros(3)
-        newest = (position_m - before) / pause_s
-        if not 0.0 < float(np.abs(newest).max()) <= largest_m_s:
-            self._velocity = None
-            return np.zeros(3)
-        known = self._velocity
-        self._velocity = newest if known is None else known + _NEWEST * (newest - known)
-        return np.zeros(3) if known is None else self._velocity
+    ahead_s = response.delay_s + response.lag_s
+    return Lead(ahead_s, 2.0 * response.damping_ratio / omega, omega**-2)
 
 
 class Follower:
     """Keeps the reference of position, pose and shape targets; other kinds pass it by."""
 
-    def __init__(self, limits: ReferenceLimits, lead: Lead, gain_per_s: float) -> None:
+    def __init__(
+        self, limits: ReferenceLimits, lead: Lead, gain_per_s: float, period_s: float
+    ) -> None:
         turn = ReferenceLimits(
             _TURN_PER_M * limits.speed_m_s,
             _TURN_PER_M * limits.acceleration_m_s2,
@@ -90,7 +68,8 @@ class Follower:
         self._position, self._pose = Reference(limits), Reference(limits, turn)
         self._lead, self._gain_per_s, self._jerk_max = lead, gain_per_s, limits.jerk_m_s3
         self._largest_m_s = limits.speed_m_s * 3.0**-0.5
-        self._stream = _Stream()
+        self._stream = Stream()
+        self._on_the_way: deque[Motion] = deque(maxlen=round(lead.ahead_s / period_s) + 1)
         self.forget()
 
     def forget(self) -> None:
@@ -102,6 +81,7 @@ class Follower:
         self._chart = np.eye(3)
         self._acceleration = [0.0] * 3
         self._stream.forget()
+        self._on_the_way.clear()
 
     @property
     def follows(self) -> bool:
@@ -115,8 +95,10 @@ class Follower:
 
     @property
     def motion(self) -> Motion | None:
-        """The reference now."""
-        return None if self._reference is None else self._reference.now
+        """Where the tip is to be now: the reference as it was when it was that far ahead."""
+        if self._reference is None:
+            return None
+        return self._on_the_way[0] if self._on_the_way else self._reference.now
 
     @property
     def goal_position(self) -> list[float]:
@@ -125,7 +107,7 @@ class Follower:
         if not isinstance(target, ShapeTarget):
             return [math.nan] * 3
         if self._reference is not None and self._reference.arrived:
-            return self._reference.now.position
+            return self._on_the_way[0].position
         return target.shape.at(min(self._shape_s, target.shape.duration_s)).position
 
     @property
@@ -155,6 +137,19 @@ class Follower:
         reference.go(goal)
         self._reference, self._moving_goal, self._since_s = reference, moving, 0.0
 
+    def _pass(self, reference: Reference, position: list[float], velocity: list[float]) -> None:
+        """Be at a position now and move on with a velocity, which is zero unless it streams."""
+        zeros, moving = [0.0] * len(position), any(velocity)
+
+        start_s = self._lead.ahead_s
+
+        def at(ahead_s: float) -> Motion:
+            moved = [p + (start_s + ahead_s) * v for p, v in zip(position, velocity, strict=True)]
+            return Motion(moved, velocity, zeros)
+
+        self._reference, self._moving_goal, self._since_s = reference, moving, 0.0
+        (reference.stream if moving else reference.go)(at)
+
     def _velocity(self, target: PositionTarget | PoseTarget, at_s: float) -> Array:
         streamed = self._stream.velocity(target.position_m, at_s, self._largest_m_s)
         given = target.velocity_m_s if isinstance(target, PositionTarget) else None
@@ -182,8 +177,7 @@ class Follower:
         if self._is_repeated(target, velocity):
             return
         self._start_position(tip, velocity_m_s)
-        goal = _passing(target.position_m.tolist(), velocity.tolist())
-        self._go(self._position, goal, moving=bool(velocity.any()))
+        self._pass(self._position, target.position_m.tolist(), velocity.tolist())
 
     def _set_pose(
         self, target: PoseTarget, at_s: float, tip: TipState, velocity_m_s: Array
@@ -194,8 +188,8 @@ class Follower:
         turned = self._start_pose(tip, velocity_m_s)
         wanted = rotation_from_quaternion(target.quaternion_xyzw)
         turn = rotation_vector(wanted @ turned.T).tolist()
-        goal = _passing([*target.position_m.tolist(), *turn], [*velocity.tolist(), 0.0, 0.0, 0.0])
-        self._go(self._pose, goal, moving=bool(velocity.any()))
+        moves = [*velocity.tolist(), 0.0, 0.0, 0.0]
+        self._pass(self._pose, [*target.position_m.tolist(), *turn], moves)
 
     def _linear(self, tip: TipState, velocity_m_s: Array) -> Motion:
         """Where a new way of the position starts: at the reference, or at the tip."""
@@ -208,7 +202,7 @@ class Follower:
 
     def _lost_m(self, velocity: list[float]) -> float:
         """The law is ahead of the reference by the lead: that alone does not make it lost."""
-        return _LOST_M + 2.0 * self._lead.velocity_s * math.hypot(*velocity)
+        return _LOST_M + 2.0 * (self._lead.ahead_s + self._lead.velocity_s) * math.hypot(*velocity)
 
     def _start_position(self, tip: TipState, velocity_m_s: Array) -> None:
         motion = self._linear(tip, velocity_m_s)
@@ -222,7 +216,7 @@ class Follower:
         if self._reference is self._pose:
             now = self._pose.now
             rotation = rotation_from_vector(np.array(now.position[3:])) @ self._chart
-            spin = _spin(np.array(now.position[3:]), np.array(now.velocity[3:])).tolist()
+            spin = spin_of(np.array(now.position[3:]), np.array(now.velocity[3:])).tolist()
             change = now.acceleration[3:]
         self._pose.start(
             [*linear.position, *zeros],
@@ -241,6 +235,7 @@ class Follower:
         self._shape_s += dt_s
         self._stand_in_the_end(reference)
         motion = reference.step(dt_s)
+        self._on_the_way.append(motion)
         by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
         ahead = np.array(
             [p + by_velocity * v + by_acceleration * a for p, v, a in zip(*motion, strict=True)]
@@ -282,32 +277,9 @@ class Follower:
             if self._since_s >= target.shape.duration_s and reference.arrived:
                 end = target.shape.at(target.shape.duration_s).position
                 self._go(reference, standing(end), moving=False)
-        elif self._since_s > _STREAM_S and isinstance(target, PositionTarget):
+        elif self._since_s > STREAM_S and isinstance(target, PositionTarget):
             self._go(reference, standing(target.position_m.tolist()), moving=False)
-        elif self._since_s > _STREAM_S and isinstance(target, PoseTarget):
+        elif self._since_s > STREAM_S and isinstance(target, PoseTarget):
             turn = rotation_vector(rotation_from_quaternion(target.quaternion_xyzw) @ self._chart.T)
             end = [*target.position_m.tolist(), *turn.tolist()]
             self._go(reference, standing(end), moving=False)
-
-
-def _passing(position: list[float], velocity: list[float]) -> Goal:
-    """Return a goal that is at a position now and moves on with a velocity."""
-    zeros = [0.0] * len(position)
-
-    def at(ahead_s: float) -> Motion:
-        moved = [p + ahead_s * v for p, v in zip(position, velocity, strict=True)]
-        return Motion(moved, velocity, zeros)
-
-    return at
-
-
-def _spin(turn: Array, rate: Array) -> Array:
-    """Angular velocity (3,) of exp(turn) whose rotation vector changes at a rate (3,)."""
-    angle = float(np.sqrt(turn @ turn))
-    if angle < 1e-9:
-        return rate
-    axis = turn / angle
-    sine = math.sin(angle) / angle
-    along: Array = axis * (axis @ rate)
-    across = (1.0 - math.cos(angle)) / angle * np.cross(axis, rate)
-    return sine * rate + (1.0 - sine) * along + across

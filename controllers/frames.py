@@ -105,3 +105,15 @@ class Frames:
     def marker_pose(self, tip: Transform) -> Transform:
         """Pose of the marker in the capture system, from the tip's (not the tool's) in the base."""
         return self.mocap_to_base.inverse() @ tip @ self.tip_to_marker.inverse()
+
+
+def spin_of(turn: Array, rate: Array) -> Array:
+    """Angular velocity (3,) of exp(turn) whose rotation vector changes at a rate (3,)."""
+    angle = float(np.sqrt(turn @ turn))
+    if angle < 1e-9:
+        return rate
+    axis = turn / angle
+    sine = math.sin(angle) / angle
+    along: Array = axis * (axis @ rate)
+    across = (1.0 - math.cos(angle)) / angle * np.cross(axis, rate)
+    return sine * rate + (1.0 - sine) * along + across

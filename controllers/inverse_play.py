@@ -11,7 +11,7 @@ import numpy as np
 from controllers.arm import Arm, Array
 
 #: Way of the acting pressure, in half widths, in which the play goes from slack to engaged.
-CROSSING = 0.25
+CROSSING = 0.1
 
 
 class InversePlay:

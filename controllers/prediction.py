@@ -21,7 +21,7 @@ class Prediction:
 
     def __init__(self, arm: Arm, period_s: float) -> None:
         self._kinematics = CompiledKinematics(arm)
-        self._step, self._input = _discrete(arm.response, period_s)
+        self._step, self._input = discrete(arm.response, period_s)
         self._state = np.zeros((3, arm.n_chambers))
         self._shape = (arm.n_sections, 3)
         self._period_s = period_s
@@ -58,7 +58,7 @@ class Prediction:
         return position, self._rotations[later]
 
 
-def _discrete(response: Response, period_s: float) -> tuple[Array, Array]:
+def discrete(response: Response, period_s: float) -> tuple[Array, Array]:
     """One tick of lag and mode, exact for an input that stays: ``x' = step x + input u``."""
     omega = 2.0 * math.pi * response.mode_hz
     rates = np.zeros((4, 4))

@@ -3,7 +3,8 @@
 Time-optimal in each axis by Ruckig (Berscheid and Kroeger, "Jerk-limited real-time trajectory
 generation with arbitrary target states", 2021). A new goal makes one plan, which meets the goal
 where it will be; from then on the reference is the goal, so a goal that keeps the limits itself
-is followed exactly.
+is followed exactly. Goals of a stream come too often to be planned for: a point that is near such
+a goal is drawn to it, which is smooth where plan after plan would not be.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,9 @@ _SHARE = 0.98
 
 #: A moving goal is met this much later than time-optimally, so that there is a time to agree on.
 _SLACK = 1.02
+
+#: How stiffly (1/s) a point is drawn to the goals of a stream.
+_PULL_PER_S = 40.0
 
 #: Tries to agree on the time, and what counts as agreed (s).
 _TRIES = 12
@@ -57,10 +61,12 @@ class Reference:
         self._speed = [_SHARE * share * axis.speed_m_s for axis in axes]
         self._acceleration = [_SHARE * share * axis.acceleration_m_s2 for axis in axes]
         self._otg, self._input = Ruckig(self.size), InputParameter(self.size)
-        self._input.max_velocity = [share * axis.speed_m_s for axis in axes]
+        self._speed_max = [share * axis.speed_m_s for axis in axes]
+        self._input.max_velocity = self._speed_max
         self._acceleration_max = [share * axis.acceleration_m_s2 for axis in axes]
         self._input.max_acceleration = self._acceleration_max
-        self._input.max_jerk = [share * axis.jerk_m_s3 for axis in axes]
+        self._jerk_max = [share * axis.jerk_m_s3 for axis in axes]
+        self._input.max_jerk = self._jerk_max
         self._input.synchronization = Synchronization.Phase
         self.error = ""
         self.start([0.0] * self.size)
@@ -73,11 +79,11 @@ class Reference:
     ) -> None:
         """Be at a position, moving or not, with nowhere to go yet but to rest there."""
         zeros = [0.0] * self.size
-        moving = _clipped(velocity or zeros, self._speed)
+        moving = _clipped(velocity or zeros, self._speed_max)
         self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration_max))
         self._goal = standing(position)
         self._plan: Trajectory | None = None
-        self._since_s = 0.0
+        self._since_s, self._drawn = 0.0, False
         if any(moving):
             self.go(self._goal)
 
@@ -110,7 +116,47 @@ class Reference:
                 break
             at_s = plan.duration if aim.velocity == zeros else _SLACK * plan.duration
             request.minimum_duration = at_s
-        self._plan, self._since_s, self._goal = plan, 0.0, goal
+        self._plan, self._since_s, self._goal, self._drawn = plan, 0.0, goal, False
+
+    def stream(self, goal: Goal) -> None:
+        """Go to the newest of goals that come one after another; draw to it once it is near."""
+        if not self._is_near(goal(0.0)):
+            self.go(goal)
+            return
+        self._plan, self._since_s, self._goal, self._drawn = None, 0.0, goal, True
+        self.error = ""
+
+    def _is_near(self, aim: Motion) -> bool:
+        """Whether a point that is drawn to the goal keeps the limits of acceleration and speed."""
+        k = _PULL_PER_S / 2.0
+        gaps = [abs(g - p) for g, p in zip(aim.position, self.now.position, strict=True)]
+        changes = [abs(w - v) for w, v in zip(aim.velocity, self.now.velocity, strict=True)]
+        speeds = [abs(v) + k * g for v, g in zip(aim.velocity, gaps, strict=True)]
+        pulls = [k * (k * g + 2.0 * c) for g, c in zip(gaps, changes, strict=True)]
+        return _within(pulls, self._acceleration) and _within(speeds, self._speed)
+
+    def _draw(self, dt_s: float) -> Motion:
+        """Move on by one tick: three equal poles, within the limits of acceleration and jerk."""
+        aim, k, moved = self._goal(self._since_s), _PULL_PER_S, []
+        for p, v, a, g, w, most, jerk in zip(
+            *self.now,
+            aim.position,
+            aim.velocity,
+            self._acceleration_max,
+            self._jerk_max,
+            strict=True,
+        ):
+            pull = k * (k * (k * (g - p) + 3.0 * (w - v)) - 3.0 * a)
+            changed = min(max(a + dt_s * min(max(pull, -jerk), jerk), -most), most)
+            j = (changed - a) / dt_s
+            moved.append(
+                (
+                    p + dt_s * (v + dt_s * (a / 2.0 + dt_s * j / 6.0)),
+                    v + dt_s * (a + changed) / 2.0,
+                    changed,
+                )
+            )
+        return Motion(*(list(part) for part in zip(*moved, strict=True)))
 
     def step(self, dt_s: float) -> Motion:
         """Move on by one tick; return where the reference is then.
@@ -118,7 +164,9 @@ class Reference:
         The goal's own time began when it was given to :meth:`go`.
         """
         self._since_s += dt_s
-        if self._plan is not None and self._since_s < self._plan.duration:
+        if self._drawn:
+            self.now = self._draw(dt_s)
+        elif self._plan is not None and self._since_s < self._plan.duration:
             self.now = Motion(*self._plan.at_time(self._since_s))
         else:
             self._plan = None
@@ -128,6 +176,10 @@ class Reference:
 
 def _clipped(values: list[float], limits: list[float]) -> list[float]:
     return [min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)]
+
+
+def _within(values: list[float], limits: list[float]) -> bool:
+    return all(abs(value) <= limit for value, limit in zip(values, limits, strict=True))
 
 
 def standing(position: list[float]) -> Goal:

@@ -13,6 +13,7 @@ from controllers.dither import Dither
 from controllers.estimator import TipEstimate
 from controllers.feedback import FeedbackSettings, TipObserver, Verdict
 from controllers.follower import Follower, lead_of
+from controllers.notch import Notch
 from controllers.targets import PoseTarget, PositionTarget, PressuresTarget, ShapeTarget, Target
 from controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from controllers.trajectory import ReferenceLimits
@@ -51,8 +52,9 @@ class Steering:
         gain = controller.settings.gain_per_s
         self._valves = ValveLead(arm.response.lag_s)
         quick = replace(arm, response=replace(arm.response, lag_s=self._valves.remaining_s))
-        self._follower = Follower(reference, lead_of(quick.response), gain)
+        self._follower = Follower(reference, lead_of(quick.response), gain, period_s)
         self.observer = TipObserver(quick, feedback, period_s)
+        self._notch = Notch(arm.response)
         self._dither = Dither(feedback.dither_pa, feedback.dither_period_s)
         self._vented_m = PressureMap(arm).lengths_m(np.zeros((arm.n_sections, 3)))
         self.tip_m = self._tip_before_m = np.zeros(3)
@@ -100,11 +102,9 @@ class Steering:
         self._follower.forget()
         self._valves.forget()
         self._target = None
-        self._correct()
-        self.tip_m = self._tip_before_m = self._controller.tip().position_m
-
-    def _correct(self) -> None:
+        self._notch.restart(self.observer.offset_m)
         self._controller.set_correction(self.observer.offset_m, self.observer.rotation)
+        self.tip_m = self._tip_before_m = self._controller.tip().position_m
 
     def measure(self, pose: SetTipPose, now_ns: int) -> None:
         """Take a measured tip pose, or say once why not."""
@@ -130,7 +130,8 @@ class Steering:
         """One tick of an active arm; returns gauge pressures (n_sections, 3) without the dither."""
         self._dt_s = dt_s or self._dt_s
         self._tip_before_m = self.tip_m
-        self._correct()
+        offset_m = self._notch.step(self.observer.offset_m, dt_s)
+        self._controller.set_correction(offset_m, self.observer.rotation)
         wanted = self._follower.step(dt_s) if dt_s > 0.0 else None
         if wanted is not None:
             awaited = self.observer.seen and self._feedback.enabled and not self._near

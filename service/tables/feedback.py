@@ -31,8 +31,8 @@ class FeedbackConfig(Table):
     enabled: bool = True
     camera_delay_ms: Annotated[float, Field(ge=0, le=300)] = 10.0
     camera_timeout_ms: Annotated[float, Field(ge=20, le=5000)] = 100.0
-    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 200.0
-    rate_max_mm_s: Positive = 100.0
+    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 170.0
+    rate_max_mm_s: Positive = 50.0
     deadband_mm: Annotated[float, Field(ge=0, le=5)] = 0.1
     jump_max_mm: Positive = 20.0
     jump_accept_s: Annotated[float, Field(gt=0, le=60)] = 0.5
@@ -40,8 +40,8 @@ class FeedbackConfig(Table):
     length_sigma_mm: Positive = 10.0
     dither_mbar: Annotated[float, Field(ge=0, le=100)] = 15.0
     dither_period_ms: Annotated[float, Field(ge=4, le=1000)] = 30.0
-    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.35
-    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.5
+    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.55
+    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.6
 
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""

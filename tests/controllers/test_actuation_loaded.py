@@ -17,7 +17,7 @@ from controllers.actuation import (
 from controllers.arm import Arm, Array
 from controllers.calibration.hysteresis import play_outputs
 from controllers.errors import InvalidInput
-from controllers.inverse_play import InversePlay
+from controllers.inverse_play import CROSSING, InversePlay
 from controllers.kinematics.compiled import symbolic_section
 from controllers.kinematics.constant_curvature import curve_transforms, shapes_from_lengths
 from controllers.kinematics.gravity import masses_kg, symbolic_potential
@@ -245,7 +245,7 @@ def test_the_inverse_play_never_jumps_and_repeats_itself_exactly() -> None:
     first = inverse.sent_pa(acting)
     np.testing.assert_array_equal(inverse.sent_pa(acting), first)
     turned = inverse.sent_pa(acting - 10.0)
-    assert np.abs(turned - first).max() <= 10.0 * (1.0 + 1.0 / 0.25) + 1e-9
+    assert np.abs(turned - first).max() <= 10.0 * (1.0 + 1.0 / CROSSING) + 1e-9
 
 
 def test_the_inverse_play_started_from_what_was_sent_sends_that_again() -> None:

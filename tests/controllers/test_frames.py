@@ -9,6 +9,7 @@ from controllers.frames import (
     Transform,
     rotation_from_vector,
     rotation_vector,
+    spin_of,
     transform_of,
 )
 from controllers.kinematics.compiled import CompiledKinematics
@@ -70,3 +71,12 @@ def test_the_kinematics_of_an_arm_with_a_tool_are_those_of_the_tool_point() -> N
         before, _ = with_tool.fresh(lengths - step)
         numeric = (after[:3, 3] - before[:3, 3]) / 2e-6
         assert jacobian[:3, chamber] == pytest.approx(numeric, abs=1e-6)
+
+
+def test_the_spin_of_a_rotation_vector_is_the_derivative_of_its_rotation() -> None:
+    turn, rate = np.array([0.4, -0.9, 0.3]), np.array([0.2, 0.5, -1.0])
+    step = 1e-6
+    later, before = (rotation_from_vector(turn + d * rate) for d in (step, -step))
+    numeric = rotation_vector(later @ before.T) / (2 * step)
+    assert spin_of(turn, rate) == pytest.approx(numeric, abs=1e-6)
+    assert spin_of(np.zeros(3), rate) == pytest.approx(rate)

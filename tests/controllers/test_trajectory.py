@@ -11,7 +11,7 @@ from controllers.trajectory import Goal, Motion, Reference, ReferenceLimits, sta
 LIMITS = ReferenceLimits(0.4, 3.0, 50.0)
 DT_S = 2e-3
 
-coordinate = st.floats(-0.2, 0.2)
+coordinate = st.floats(-0.2, 0.2) | st.floats(-1e-3, 1e-3)
 speed = st.floats(-0.15, 0.15)
 target = st.tuples(
     st.tuples(coordinate, coordinate, coordinate),
@@ -35,7 +35,7 @@ def test_random_targets_never_exceed_a_limit_and_never_jump(targets: list) -> No
     reference = Reference(LIMITS)
     motions = [reference.now]
     for position, velocity, ticks in targets:
-        reference.go(moving(position, velocity))
+        (reference.go if velocity is None else reference.stream)(moving(position, velocity))
         assert reference.error == ""
         motions += [reference.step(DT_S) for _ in range(ticks)]
     position, velocity, acceleration = (np.array(part) for part in zip(*motions, strict=True))

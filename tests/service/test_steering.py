@@ -51,9 +51,10 @@ def test_loss_and_return_on_a_circle_are_told_and_jump_no_command(rig: Rig) -> N
     assert lost["tip_estimated_sigma_m"][-1] > lost["tip_estimated_sigma_m"][0]
     rig.camera = True
     back = rig.circle(CIRCLE, 1.0)
-    # The correction may move by 100 mm/s, which is 0.2 mm in a tick, on top of the circle.
+    # The correction may move by 50 mm/s, 0.1 mm in a tick, on top of the circle; where it starts
+    # and stops, the notch takes it twice as fast for some 20 ms.
     assert largest(lost) < undisturbed + 2e-4
-    assert largest(back) < undisturbed + 2e-4
+    assert largest(back) < undisturbed + 3e-4
     assert [event.code for event in rig.events] == ["camera_lost", "camera_seen"]
 
 
