@@ -168,7 +168,7 @@ class Controller:
         if not self._detour.taken or goal is None:
             return False
         left_m = max(map(abs, (goal - self.lengths_m).reshape(-1).tolist()))
-        return self._way.judge(left_m, dt_s) == Reach.MOVING
+        return self._way.judge(max(0.0, left_m - self._detour.slack_m), dt_s) == Reach.MOVING
 
     def pressures_pa(self) -> Array:
         """Gauge pressures (n_sections, 3) of the commanded lengths, inside their limits.

@@ -18,6 +18,9 @@ from controllers.targets import PositionTarget, Target
 #: A goal counts as better than where the tip is from this much on, m.
 _BETTER_M = 2e-5
 
+#: How far the tip may be from a goal that moves, because the correction does, m.
+_WANDERS_M = 3e-4
+
 #: The tip is stuck when its error has not gone down by _LEAST_M within _PATIENCE_S.
 _LEAST_M = 1e-5
 _PATIENCE_S = 0.03
@@ -40,6 +43,9 @@ class Detour:
         self._possible = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
         self.goal_m: Array | None = None
         self.taken = False
+        #: How far from its goal the tip may be for no other reason than that the goal moves.
+        self.slack_m = 0.0
+        self._offset_m: Array | None = None
         self._goal_error_m = self._best_m = math.inf
         self._stuck_s = 0.0
         self._position_m: Array | None = None
@@ -53,6 +59,8 @@ class Detour:
         moved = math.inf if before is None else math.dist(target.position_m, before)
         if not moved <= _JUMP_M:
             self.taken = False
+        still = self._offset_m is None or bool((offset_m == self._offset_m).all())
+        self._offset_m, self.slack_m = offset_m, 0.0 if still else _WANDERS_M
         if moved != 0.0:
             self._best_m, self._stuck_s = math.inf, 0.0
         self.goal_m = self._exact(*(target.position_m - offset_m).tolist())
@@ -88,7 +96,7 @@ class Detour:
         if self._best_m - error_m >= _LEAST_M or self._best_m == math.inf:
             self._best_m, self._stuck_s = error_m, 0.0
         stuck = stalled or self._stuck_s >= _PATIENCE_S
-        self.taken = stuck and error_m > self._goal_error_m + _BETTER_M
+        self.taken = stuck and error_m > self._goal_error_m + _BETTER_M + self.slack_m
         return self.taken
 
 

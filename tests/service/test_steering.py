@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.estimator import EstimateSource
+from controllers.reach import Reach
 from controllers.shapes import Circle
 from controllers.targets import LengthsTarget, PressuresTarget
 from service.commands import RequestMode
@@ -34,6 +35,15 @@ def test_the_measured_tip_takes_the_arm_to_its_target(rig: Rig) -> None:
     assert 0.0 < last["tip_estimated_sigma_m"] < 2e-3
     for name in ("reference_position_m", "reference_velocity_m_s", "tip_offset_m"):
         assert np.isfinite(ticks[name]).all()
+
+
+def test_a_target_is_reached_although_the_correction_never_rests() -> None:
+    calibrated = calibrated_configuration()
+    control = calibrated.control.model_copy(update={"rate_hz": 1000.0})
+    rig = Rig(calibrated.model_copy(update={"control": control})).activate()
+    ticks = rig.to(np.array([0.04, 0.0, 0.2]), 5.0)
+    assert ticks["reach"][-1] == Reach.REACHED
+    assert np.ptp(ticks["tip_offset_m"][-500:], axis=0).max() > 0.0
 
 
 def test_loss_and_return_on_a_circle_are_told_and_jump_no_command(rig: Rig) -> None:
