@@ -54,7 +54,7 @@ class FeedbackSettings:
     dither_pa: float = 1500.0
     dither_period_s: float = 0.03
     hysteresis_share: float = 0.55
-    hysteresis_share_moving: float = 0.6
+    hysteresis_share_moving: float = 0.65
 
 
 class Verdict(Enum):

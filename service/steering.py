@@ -29,8 +29,8 @@ _NONE = np.full(3, np.nan)
 #: time (s).
 _RAMP_S = 0.3
 
-#: A reference faster than this (m/s) moves the arm through its hysteresis by itself.
-_MOVING_M_S = 0.005
+#: A reference as fast as this (m/s) moves the arm through its hysteresis by itself.
+_MOVING_M_S = 0.06
 
 
 class Steering:
@@ -169,11 +169,11 @@ class Steering:
         return share * self._dither.at_pa(now_s)
 
     def _follow_share(self) -> None:
-        """Let the inverted share of the hysteresis go to that of an arm that moves, or rests."""
+        """Let the inverted share of the hysteresis follow the speed of the reference."""
         motion, feedback = self._follower.motion, self._feedback
-        moving = motion is not None and max(map(abs, motion.velocity[:3])) > _MOVING_M_S
-        wanted = feedback.hysteresis_share_moving if moving else feedback.hysteresis_share
-        self._go_to_share(wanted)
+        speed_m_s = 0.0 if motion is None else math.hypot(*motion.velocity[:3])
+        at_rest, moving = feedback.hysteresis_share, feedback.hysteresis_share_moving
+        self._go_to_share(at_rest + min(1.0, speed_m_s / _MOVING_M_S) * (moving - at_rest))
 
     def _go_to_share(self, wanted: float) -> None:
         largest = self._dt_s / _RAMP_S

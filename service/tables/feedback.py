@@ -41,7 +41,7 @@ class FeedbackConfig(Table):
     dither_mbar: Annotated[float, Field(ge=0, le=100)] = 15.0
     dither_period_ms: Annotated[float, Field(ge=4, le=1000)] = 30.0
     hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.55
-    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.6
+    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.65
 
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""
