@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from controllers.estimator import EstimateSource
 from logs.reader import LogReader
 
 
@@ -69,6 +70,14 @@ class _Read:
         return 1e3 * float(np.sqrt(np.nanmean(square)))
 
     @property
+    def name(self) -> str:
+        """Of the part; behind a device, by what the tip is estimated."""
+        if self.drawn.name != "device":
+            return self.drawn.name
+        senses = (self.ticks["tip_estimated_source"] == EstimateSource.LENGTHS).any()
+        return "by lengths" if senses else "by pressures"
+
+    @property
     def missing(self) -> int:
         numbers = self.ticks["sequence"]
         return int(numbers[-1]) - len(np.unique(numbers))
@@ -93,7 +102,7 @@ def evaluate(drawn: Sequence[Drawn]) -> Figures:
         compute_us=_latency(np.concatenate([each["compute_s"][1:] for each in ticks])),
         missing_records=sum(run.missing for run in runs),
         tip_rms_error_mm=last.error_mm(*moving),
-        eight_rms_error_mm={run.drawn.name: run.error_mm("eight") for run in runs},
+        eight_rms_error_mm={run.name: run.error_mm("eight") for run in runs},
         log=str(last.drawn.log),
         logs=[str(run.drawn.log) for run in runs],
         log_bytes=sum(run.log_bytes for run in runs),
@@ -110,7 +119,8 @@ _MEANING = {
     "uncalibrated": "nominal model, the tip is not measured",
     "calibrated": "calibrated model, the tip is not measured",
     "feedback": "calibrated model, the tip measured at 100 Hz, 10 ms late",
-    "device": "the estimated tip: behind a device nobody knows the true one",
+    "by pressures": "only the model's own error shows: the true tip is not measured",
+    "by lengths": "the device's length sensors see it; the arm is not calibrated",
 }
 
 
