@@ -19,8 +19,12 @@ _SHARE = 0.98
 #: A moving goal is met this much later than time-optimally, so that there is a time to agree on.
 _SLACK = 1.02
 
-#: How stiffly (1/s) a point is drawn to the goals of a stream.
-_PULL_PER_S = 40.0
+#: How stiffly (1/s) a point is drawn to the goals of a stream at most, and at least: where that
+#: would ask too much of the limits it is far away, and a plan takes it there.
+_PULL_MAX_PER_S, _PULL_MIN_PER_S = 40.0, 15.0
+
+#: A point that is drawn is let go below this (1/s), and gets stiffer by no more than this a goal.
+_PULL_KEPT_PER_S, _STIFFER = 7.0, 1.05
 
 #: Tries to agree on the time, and what counts as agreed (s).
 _TRIES = 12
@@ -83,7 +87,8 @@ class Reference:
         self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration_max))
         self._goal = standing(position)
         self._plan: Trajectory | None = None
-        self._since_s, self._drawn = 0.0, False
+        self._since_s = self._plan_s = self._drawn_per_s = 0.0
+        self._streams = False
         if any(moving):
             self.go(self._goal)
 
@@ -116,28 +121,54 @@ class Reference:
                 break
             at_s = plan.duration if aim.velocity == zeros else _SLACK * plan.duration
             request.minimum_duration = at_s
-        self._plan, self._since_s, self._goal, self._drawn = plan, 0.0, goal, False
+        self._plan, self._goal, self._streams = plan, goal, False
+        self._since_s = self._plan_s = self._drawn_per_s = 0.0
 
     def stream(self, goal: Goal) -> None:
-        """Go to the newest of goals that come one after another; draw to it once it is near."""
-        if not self._is_near(goal(0.0)):
-            self.go(goal)
-            return
-        self._plan, self._since_s, self._goal, self._drawn = None, 0.0, goal, True
-        self.error = ""
+        """Go to the newest of goals that come one after another, and stay with them smoothly.
 
-    def _is_near(self, aim: Motion) -> bool:
-        """Whether a point that is drawn to the goal keeps the limits of acceleration and speed."""
-        k = _PULL_PER_S / 2.0
-        gaps = [abs(g - p) for g, p in zip(aim.position, self.now.position, strict=True)]
-        changes = [abs(w - v) for w, v in zip(aim.velocity, self.now.velocity, strict=True)]
-        speeds = [abs(v) + k * g for v, g in zip(aim.velocity, gaps, strict=True)]
-        pulls = [k * (k * g + 2.0 * c) for g, c in zip(gaps, changes, strict=True)]
-        return _within(pulls, self._acceleration) and _within(speeds, self._speed)
+        A plan that still ends near them is followed to its end: a new one every few milliseconds
+        would be nothing but jerks.
+        """
+        plan = self._plan
+        if plan is not None and self._streams and self._meets(plan, goal):
+            self._goal, self._since_s = goal, 0.0
+            return
+        pull_per_s = self._pull_per_s(self.now, goal(0.0))
+        known_per_s = self._drawn_per_s if self._streams else 0.0
+        if known_per_s:
+            pull_per_s = min(pull_per_s, _STIFFER * known_per_s)
+        if pull_per_s < (_PULL_KEPT_PER_S if known_per_s else _PULL_MIN_PER_S):
+            self.go(goal)
+        else:
+            self._plan, self._goal, self._since_s, self.error = None, goal, 0.0, ""
+            self._drawn_per_s = pull_per_s
+        self._streams = True
+
+    def _meets(self, plan: Trajectory, goal: Goal) -> bool:
+        """Whether the plan ends so near the goal that the point can be drawn to it from there."""
+        left_s = max(0.0, plan.duration - self._plan_s)
+        end = Motion(*plan.at_time(plan.duration))
+        return self._pull_per_s(end, goal(left_s)) >= _PULL_MIN_PER_S
+
+    def _pull_per_s(self, now: Motion, aim: Motion) -> float:
+        """How stiffly a point may be drawn to the goal within the limits; 0 for not at all.
+
+        It is less where the point is far away or has another speed, so that no jerk is cut off:
+        cut off, it would swing around the goal.
+        """
+        pull = _PULL_MAX_PER_S
+        for i, (jerk, fastest) in enumerate(zip(self._jerk_max, self._speed, strict=True)):
+            gap, change = aim.position[i] - now.position[i], aim.velocity[i] - now.velocity[i]
+            while abs(_jerk(pull, gap, change, now.acceleration[i])) > jerk:
+                pull *= 0.9
+            if abs(aim.velocity[i]) + 0.5 * pull * abs(gap) > fastest:
+                return 0.0
+        return pull
 
     def _draw(self, dt_s: float) -> Motion:
         """Move on by one tick: three equal poles, within the limits of acceleration and jerk."""
-        aim, k, moved = self._goal(self._since_s), _PULL_PER_S, []
+        aim, k, moved = self._goal(self._since_s), self._drawn_per_s, []
         for p, v, a, g, w, most, jerk in zip(
             *self.now,
             aim.position,
@@ -146,8 +177,8 @@ class Reference:
             self._jerk_max,
             strict=True,
         ):
-            pull = k * (k * (k * (g - p) + 3.0 * (w - v)) - 3.0 * a)
-            changed = min(max(a + dt_s * min(max(pull, -jerk), jerk), -most), most)
+            wanted = min(max(_jerk(k, g - p, w - v, a), -jerk), jerk)
+            changed = min(max(a + dt_s * wanted, -most), most)
             j = (changed - a) / dt_s
             moved.append(
                 (
@@ -164,22 +195,27 @@ class Reference:
         The goal's own time began when it was given to :meth:`go`.
         """
         self._since_s += dt_s
-        if self._drawn:
+        self._plan_s += dt_s
+        if self._plan is not None and self._plan_s < self._plan.duration:
+            self.now = Motion(*self._plan.at_time(self._plan_s))
+        elif self._streams:
+            if self._plan is not None:
+                self._drawn_per_s = self._pull_per_s(self.now, self._goal(self._since_s))
+            self._plan = None
             self.now = self._draw(dt_s)
-        elif self._plan is not None and self._since_s < self._plan.duration:
-            self.now = Motion(*self._plan.at_time(self._since_s))
         else:
             self._plan = None
             self.now = self._goal(self._since_s)
         return self.now
 
 
+def _jerk(pull_per_s: float, gap: float, change: float, acceleration: float) -> float:
+    """Jerk of a point with three equal poles that lacks a way and a velocity to its goal."""
+    return pull_per_s * (pull_per_s * (pull_per_s * gap + 3.0 * change) - 3.0 * acceleration)
+
+
 def _clipped(values: list[float], limits: list[float]) -> list[float]:
     return [min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)]
-
-
-def _within(values: list[float], limits: list[float]) -> bool:
-    return all(abs(value) <= limit for value, limit in zip(values, limits, strict=True))
 
 
 def standing(position: list[float]) -> Goal:
