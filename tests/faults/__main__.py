@@ -30,10 +30,14 @@ FAULTS: tuple[Fault, ...] = (
 def main() -> int:
     """Run the campaign; 1 if an invariant was broken, 130 after Ctrl-C."""
     options = _parse()
-    report, begin = Report(options.seed), time.monotonic()
+    chosen = _chosen(options.only)
+    report, begin = Report(options.seed, faults=len(chosen)), time.monotonic()
     try:
-        for row in run_campaign(_chosen(options.only), options.times, options.seed):
+        for row in run_campaign(chosen, options.times, options.seed):
             report.rows.append(row)
+            report.seconds = time.monotonic() - begin
+            if options.write:
+                write_page(options.write, report.markdown())
         if not options.only or "stop" in options.only:
             tell("the stop's latency")
             report.stop = measure_stop(options.stops)
@@ -41,7 +45,7 @@ def main() -> int:
         report.interrupted = True
         tell("\ninterrupted; this is what there is")
     report.seconds = time.monotonic() - begin
-    if options.write and not report.interrupted:
+    if options.write:
         write_page(options.write, report.markdown())
     print(json.dumps(report.json(), indent=1) if options.json else report.markdown())
     for line in report.broken:

@@ -21,6 +21,8 @@ class Report:
     stop: StopLatency | None = None
     seconds: float = 0.0
     interrupted: bool = False
+    #: How many faults there are to come in all; 0 where that is not known.
+    faults: int = 0
 
     @property
     def broken(self) -> list[str]:
@@ -56,7 +58,7 @@ class Report:
         day = datetime.now(UTC).strftime("%Y-%m-%d")
         text = [
             f"`make faults`, {day}: {injections} injections in {self.seconds / 60:.0f} min, seed "
-            f"{self.seed}, {len(self.broken)} invariants broken.",
+            f"{self.seed}, {len(self.broken)} invariants broken{self._unfinished}.",
             self.table(),
         ]
         if lines := [f"- {line}" for row in self.rows if (line := figures(row))]:
@@ -66,6 +68,11 @@ class Report:
         if self.broken:
             text.append("\n".join(f"- {line}" for line in self.broken))
         return "\n\n".join(text)
+
+    @property
+    def _unfinished(self) -> str:
+        done = len(self.rows)
+        return f"; unfinished: {done} of {self.faults} faults" if done < self.faults else ""
 
     def json(self) -> dict[str, Any]:
         """The same for programs."""

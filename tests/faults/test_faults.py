@@ -97,6 +97,8 @@ def test_a_fault_that_cannot_be_injected_says_why() -> None:
     (row,) = run_campaign([fault], times=3, seed=0)
     assert row.injections == []
     assert "| never | goes on | 0 | needs rights |" in Report(0, [row]).table()
+    assert "unfinished: 1 of 3 faults" in Report(0, [row], faults=3).markdown()
+    assert "unfinished" not in Report(0, [row], faults=1).markdown()
 
 
 def test_garbage_is_the_same_for_a_seed_and_of_every_kind() -> None:
