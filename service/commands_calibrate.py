@@ -11,7 +11,7 @@ from controllers.calibration.calibrate import Calibration, calibrate
 from controllers.calibration.plan import duration_s, plan
 from controllers.calibration.recording import Recording
 from service.calibration.drive import progress, record, require_tip
-from service.calibration.files import require_folder, toml_text, write_whole
+from service.calibration.files import calibrated, require_folder, toml_text, write_whole
 from service.calibration.page import page
 from service.calibration.recordings import read_logs, require_seen
 from service.calibration.values import errors_mm, residuals_text, value_text, values
@@ -34,6 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
     write_whole(folder / _PAGE, page(found))
     write_whole(folder / _TOML, text)
     _tell(arguments, found, folder)
+    if found.fit.in_world and not arguments.json:
+        frame = calibrated(configuration, found).frames.mocap_frame
+        print(f"with it, tip poses must come in under the frame {frame!r}: see its [frames]")
     return 0
 
 

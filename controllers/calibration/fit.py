@@ -53,6 +53,8 @@ class Fit:
     measured_m: Array
     before_m: Array
     after_m: Array
+    #: Whether ``frames`` were fitted; else they are those of a tip measured in the base.
+    in_world: bool
 
 
 class _Problem:
@@ -168,4 +170,5 @@ def fit(arm: Arm, recording: Recording, rests: Rests, in_world: bool = False) ->
         measured_m=rests.tip_m,
         before_m=problem.before_m,
         after_m=after_m,
+        in_world=in_world,
     )

@@ -7,18 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from controllers.arm import Response, Section
+from controllers.arm import Array, Response, Section
 from controllers.calibration.calibrate import Calibration
+from controllers.calibration.frames import Frames
 from controllers.errors import ConfigurationError
+from controllers.frames import Transform, rotation_vector
 from service.calibration.values import residuals_text, value_text, values
 from service.config import Configuration, check
+from service.tables.frames import FramesConfig
 from service.tables.table import BAR, DEG, MM
+
+#: Name of a capture system that had none before its frame was found.
+MOCAP_FRAME = "mocap"
 
 _DIGITS = 7
 
 
 def calibrated(configuration: Configuration, calibration: Calibration) -> Configuration:
-    """Return the configuration with the fitted values.
+    """Return the configuration with the fitted values, and with the frames if they were fitted.
 
     A simulated arm stays what it was: the simulator goes on with the arm from before.
     """
@@ -28,6 +34,8 @@ def calibrated(configuration: Configuration, calibration: Calibration) -> Config
     sections = zip(tables["arm"]["sections"], calibration.arm.sections, strict=True)
     tables["arm"]["sections"] = [old | _section(section) for old, section in sections]
     tables["arm"]["response"] = _response(calibration.arm.response)
+    if calibration.fit.in_world:
+        tables["frames"] |= frames_table(configuration.frames, calibration.fit.frames)
     return check(tables, "calibration.toml")
 
 
@@ -52,6 +60,28 @@ def _response(response: Response) -> dict[str, float]:
         "mode_hz": _rounded(response.mode_hz),
         "damping_ratio": _rounded(response.damping_ratio),
     }
+
+
+def frames_table(before: FramesConfig, found: Frames) -> dict[str, Any]:
+    """Keys of ``[frames]`` with which the poses that were measured are those of the arm's tip.
+
+    They were measured through the frames of ``before``: in the capture system's if it had a name,
+    else as if it were the base.
+    """
+    known = before.frames()
+    seen = known.mocap_to_base if before.mocap_frame else Transform()
+    mocap = Transform(found.rotation, found.translation_m).inverse() @ seen
+    tip = known.tip_to_marker @ Transform(position_m=-found.marker_m)
+    return {
+        "mocap_frame": before.mocap_frame or MOCAP_FRAME,
+        "mocap_position_mm": _triple(mocap.position_m / MM),
+        "mocap_rotation_deg": _triple(np.rad2deg(rotation_vector(mocap.rotation))),
+        "tip_in_marker_position_mm": _triple(tip.position_m / MM),
+    }
+
+
+def _triple(values: Array) -> tuple[float, ...]:
+    return tuple(_rounded(value) for value in values.tolist())
 
 
 def _rounded(value: float) -> float:

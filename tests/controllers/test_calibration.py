@@ -89,6 +89,8 @@ def test_the_fit_finds_the_frames_of_the_measurement_too() -> None:
     np.testing.assert_allclose(found.after_m, world[rests.last], atol=6e-4)
     np.testing.assert_allclose(found.frames.rotation, frames.rotation, atol=0.03)
     np.testing.assert_allclose(found.frames.translation_m, frames.translation_m, atol=0.02)
+    assert found.in_world
+    assert not calibration("paper").fit.in_world
 
 
 def test_the_response_is_found_from_steps() -> None:
