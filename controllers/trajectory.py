@@ -143,7 +143,7 @@ class Reference:
         else:
             self._plan, self._goal, self._since_s, self.error = None, goal, 0.0, ""
             self._drawn_per_s = pull_per_s
-        self._streams = True
+        self._streams = self._streams or not self.error
 
     def _meets(self, plan: Trajectory, goal: Goal) -> bool:
         """Whether the plan ends so near the goal that the point can be drawn to it from there."""
@@ -200,7 +200,8 @@ class Reference:
             self.now = Motion(*self._plan.at_time(self._plan_s))
         elif self._streams:
             if self._plan is not None:
-                self._drawn_per_s = self._pull_per_s(self.now, self._goal(self._since_s))
+                pull_per_s = self._pull_per_s(self.now, self._goal(self._since_s))
+                self._drawn_per_s = max(pull_per_s, _PULL_KEPT_PER_S)
             self._plan = None
             self.now = self._draw(dt_s)
         else:
