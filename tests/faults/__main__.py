@@ -15,7 +15,7 @@ from tests.faults import (
 )
 from tests.faults.campaign import run_campaign, tell
 from tests.faults.fault import Fault
-from tests.faults.report import Report, write_page
+from tests.faults.report import Report, write_again, write_page
 from tests.faults.stop_latency import measure_stop
 
 FAULTS: tuple[Fault, ...] = (
@@ -36,7 +36,7 @@ def main() -> int:
         for row in run_campaign(chosen, options.times, options.seed):
             report.rows.append(row)
             report.seconds = time.monotonic() - begin
-            if options.write:
+            if options.write and not options.only:
                 write_page(options.write, report.markdown())
         if not options.only or "stop" in options.only:
             tell("the stop's latency")
@@ -45,7 +45,9 @@ def main() -> int:
         report.interrupted = True
         tell("\ninterrupted; this is what there is")
     report.seconds = time.monotonic() - begin
-    if options.write:
+    if options.write and options.only:
+        write_again(options.write, report)
+    elif options.write:
         write_page(options.write, report.markdown())
     print(json.dumps(report.json(), indent=1) if options.json else report.markdown())
     for line in report.broken:

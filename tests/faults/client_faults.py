@@ -13,6 +13,9 @@ _TIMEOUT_S = TABLES["control"]["target_timeout_ms"] * 1e-3
 #: Beyond the timeout: one tick, and what the last target was late when the fault happened.
 _HOLDS_S = _TIMEOUT_S + 0.05
 
+#: A moving arm's setpoints are ahead of its pressures; a hold takes that off within the slew limit.
+_LEAD_S = 0.1
+
 
 def _killed(rig: Rig, injection: Injection) -> None:
     injection.must_reach(pb.HOLD, within_s=_HOLDS_S)
@@ -29,6 +32,7 @@ def _frozen(rig: Rig, injection: Injection) -> None:
     rig.mover.process.send_signal(signal.SIGSTOP)
     try:
         rig.wait_for_mode(pb.HOLD)
+        time.sleep(_LEAD_S)
         held = list(rig.watcher.state().pressure_sent_pa)
     finally:
         rig.mover.process.send_signal(signal.SIGCONT)

@@ -137,8 +137,39 @@ def _label(name: str) -> tuple[str, float, str]:
 
 def write_page(page: Path, text: str) -> None:
     """Put the text between the comments of a page; raises ValueError where they are missing."""
+    before, _, after = _parts(page)
+    page.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}")
+
+
+def write_again(page: Path, report: Report) -> None:
+    """Put the rows of some faults in the place of those that stand in the page, and say so."""
+    _, known, _ = _parts(page)
+    new = {f"| {row.fault.name} |": row for row in report.rows}
+    rows = report.table().splitlines()[2:]
+    own = tuple(f"- {row.fault.name}{mark}" for row in report.rows for mark in (":", ", seed"))
+    lines = []
+    for line in known.strip().splitlines():
+        name = next((name for name in new if line.startswith(name)), None)
+        if name is not None:
+            line = next(row for row in rows if row.startswith(name))
+        if not line.startswith(own):
+            lines.append(line)
+    names = ", ".join(row.fault.name for row in report.rows)
+    injections = sum(len(row.injections) for row in report.rows)
+    lines += [
+        "",
+        f"Again: {names}: {injections} injections, seed {report.seed}, {len(report.broken)} "
+        "invariants broken; these rows are of that run.",
+        "",
+        *(f"- {line}" for row in report.rows if (line := figures(row))),
+        *(f"- {line}" for line in report.broken),
+    ]
+    write_page(page, "\n".join(lines).strip())
+
+
+def _parts(page: Path) -> tuple[str, str, str]:
     before, begin, rest = page.read_text().partition(BEGIN)
-    _, end, after = rest.partition(END)
+    known, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError(f"{page} lacks the comments {BEGIN} and {END}")
-    page.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}")
+    return before, known, after

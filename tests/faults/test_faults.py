@@ -13,7 +13,7 @@ from tests.faults.campaign import run_campaign
 from tests.faults.device_audit import audit_device
 from tests.faults.fault import Fault, Injection, Row
 from tests.faults.fuzz import Garbage
-from tests.faults.report import BEGIN, END, Report, write_page
+from tests.faults.report import BEGIN, END, Report, write_again, write_page
 
 
 @pytest.mark.slow
@@ -90,6 +90,24 @@ def test_what_is_broken_is_told_with_its_seed_and_goes_into_the_page(tmp_path: P
     page.write_text("no comments")
     with pytest.raises(ValueError, match="lacks the comments"):
         write_page(page, "")
+
+
+def test_a_fault_that_is_run_again_takes_its_row_and_leaves_the_others(tmp_path: Path) -> None:
+    def row(name: str, kept: int, broken: list[str]) -> Row:
+        injection = Injection(name, 0, random.Random(0), kept=kept, broken=broken)
+        return Row(Fault(name, "holds", lambda rig, injection: None), [injection])
+
+    page = tmp_path / "page.md"
+    page.write_text(f"above\n{BEGIN}\n{END}\nbelow\n")
+    first = Report(0, [row("one", 5, []), row("two", 4, ["the slew"])])
+    write_page(page, first.markdown())
+    assert "- two, seed 0: the slew" in page.read_text()
+    write_again(page, Report(0, [row("two", 5, [])]))
+    text = page.read_text()
+    assert "| one | holds | 1 | 5 of 5 |" in text
+    assert "| two | holds | 1 | 5 of 5 |" in text
+    assert "- two, seed" not in text
+    assert "Again: two: 1 injections, seed 0, 0 invariants broken" in text
 
 
 def test_a_fault_that_cannot_be_injected_says_why() -> None:
