@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from controllers.actuation import PressureMap
+from controllers.actuation_symbols import is_plain
 from controllers.arm import CHAMBER_ANGLES_RAD, Arm, Array
 from controllers.kinematics.constant_curvature import tip_transform
 from controllers.law import Limits
@@ -20,6 +22,9 @@ _BETTER_M = 2e-5
 
 #: How far the tip may be from a goal that moves, because the correction does, m.
 _WANDERS_M = 3e-4
+
+#: Pressures count as inside their range up to this much beyond it, Pa: lengths round.
+_AT_RANGE_PA = 1.0
 
 #: The tip is stuck when its error has not gone down by _LEAST_M within _PATIENCE_S.
 _LEAST_M = 1e-5
@@ -35,7 +40,10 @@ class Detour:
     """Says when to go by the lengths, and to which."""
 
     def __init__(self, arm: Arm, limits: Limits) -> None:
-        self._arm = arm
+        self._arm, self._plain = arm, is_plain(arm)
+        self._pressure_map = PressureMap(arm)
+        self._pressure_low = arm.per_chamber("pressure_min_pa") - _AT_RANGE_PA
+        self._pressure_high = arm.per_chamber("pressure_max_pa") + _AT_RANGE_PA
         self._low_m = float(limits.length.lower_m[0, 0])
         self._high_m = float(limits.length.upper_m[0, 0])
         # A keep-out is no convex set: there the straight way of the lengths may be closed too. The
@@ -69,6 +77,16 @@ class Detour:
             self.goal_m = target.nearest_lengths_m
             tip = tip_transform(self._arm, self.goal_m)[:3, 3] + offset_m
             self._goal_error_m = math.dist(tip, target.position_m)
+        if self.goal_m is not None and not self._is_allowed(self.goal_m):
+            self.goal_m, self.taken = None, False
+
+    def _is_allowed(self, lengths_m: Array) -> bool:
+        """Whether the pressures for them exist: the bounds of the lengths are but a box around."""
+        if self._plain:
+            return True
+        pressures = self._pressure_map.pressures_pa(lengths_m)
+        inside = (pressures >= self._pressure_low) & (pressures <= self._pressure_high)
+        return bool(inside.all())
 
     def _exact(self, x: float, y: float, z: float) -> Array | None:
         """Lengths (1, 3) of the one arc that ends there; None where it leaves the limits."""

@@ -134,14 +134,20 @@ class SafeStep:
     def _slack(self, before: ca.SX, moved: ca.SX, rates: ca.SX, dt: ca.SX, share: ca.SX) -> ca.SX:
         """The least that is left of any limit, in metres; NaN if any of it is.
 
-        What is no convex set is looked at in places, so braking needs room for what lies between.
+        What is no convex set is looked at in places, so braking needs room for what lies between:
+        half of a margin, or what there is of it already. A chamber that is vented to the last
+        pascal must not keep the others from moving.
         """
         stop = moved + rates * (0.5 * self._stopping_time(rates))
         places = [moved, 0.5 * (moved + stop), stop]
+        rooms = [
+            ca.fmax(0.0, ca.fmin(0.5 * limit.margin_m, limit.slack(before)))
+            for limit in self._limits.others
+        ]
         slacks = [limit.slack(stop) for limit in self._limits.convex]
         slacks += [
-            limit.slack(place) - 0.5 * limit.margin_m * (share > 0.0)
-            for limit in self._limits.others
+            limit.slack(place) - (share > 0.0) * room
+            for limit, room in zip(self._limits.others, rooms, strict=True)
             for place in places
         ]
         slacks.append(self._limits.pressure.slew_slack(before, moved, dt))

@@ -45,7 +45,9 @@ def decode(message_type: type[M], payload: bytes, encoding: str) -> M:
             message.ParseFromString(payload)
     except (json_format.ParseError, DecodeError, UnicodeDecodeError, RecursionError) as error:
         kind = "JSON" if is_json(encoding) else "protobuf"
-        detail = str(error).splitlines()[0][:200]
+        # Half a surrogate pair in JSON cannot be written as UTF-8, so not into an event.
+        shown = str(error).encode("utf-8", "backslashreplace").decode()
+        detail = shown.splitlines()[0][:200]
         raise TargetRejected(f"payload is not the {kind} form of {name}: {detail}") from error
     if _has_unknown_fields(message):
         raise TargetRejected(f"payload has fields that {name} does not have; wrong message type?")

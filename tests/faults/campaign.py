@@ -98,6 +98,7 @@ class FaultRun:
             self._rig.end_programs()
             self._rig.daemon.stop()
         except _FAILED as error:
+            tell(f"\n{error}")
             last.check("the end", False, str(error))
         self._close()
 

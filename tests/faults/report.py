@@ -28,7 +28,7 @@ class Report:
     def broken(self) -> list[str]:
         """One line for every invariant that was broken, and how to see it again."""
         lines = [
-            f"{i.fault}, seed {i.seed}: {what}  (again: python -m tests.faults --only "
+            f"{i.fault}, seed {i.seed}: {_line(what)}  (again: python -m tests.faults --only "
             f"{i.fault!r} --times 1 --seed {i.seed})"
             for row in self.rows
             for i in row.injections
@@ -96,6 +96,11 @@ class Report:
                 for row in self.rows
             ],
         }
+
+
+def _line(text: str) -> str:
+    """One line of a text that may be a daemon's whole output."""
+    return text if len(text) <= 200 else " ".join(text[:200].split()) + " ..."
 
 
 def _times(times_s: list[float]) -> list[str]:

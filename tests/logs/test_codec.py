@@ -141,6 +141,12 @@ def test_json_that_is_none_or_no_target_is_refused(text: str) -> None:
     assert "payload is not the JSON form of pneuarm.Target" in refusal(text.encode(), JSON)
 
 
+def test_half_a_surrogate_pair_is_refused_in_a_sentence_that_can_be_written() -> None:
+    refused = refusal(rb'{"lengths": {"length_m": "\ud800"}}', JSON)
+    assert "\\ud800" in refused
+    refused.encode()
+
+
 def test_text_that_is_not_utf_8_is_refused() -> None:
     assert "JSON" in refusal(b'{"client_id": "\xff"}', JSON)
 
