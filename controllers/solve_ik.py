@@ -190,14 +190,18 @@ class IkBuilder:
         def allowed(slack: ca.SX, margin: float) -> ca.SX:
             return ca.fmin(gain * dt, 1.0) * (slack - margin)
 
-        def sides(slack: ca.SX, margin: float) -> tuple[ca.SX, ca.SX]:
-            bound = allowed(slack, margin)
+        def sides(bound: ca.SX) -> tuple[ca.SX, ca.SX]:
             return -bound[:n], bound[n:]
 
         length, pressure = self._limits.length, self._limits.pressure
-        lower, upper = sides(length.slack(lengths), length.margin_m)
+        lower, upper = sides(allowed(length.slack(lengths), length.margin_m))
         matrix, extra_lower, extra_upper = ca.SX.eye(n), [], []
-        below, above = sides(pressure.slack(lengths), pressure.margin_m)
+        # A vented chamber has none of its margin. It is small, and taken back at once: without it
+        # the arm could but creep along this curved bound.
+        slack = pressure.slack(lengths)
+        lacking = ca.fmax(slack - pressure.margin_m, -pressure.margin_m)
+        below, above = sides(ca.fmin(lacking, allowed(slack, pressure.margin_m)))
+        above = ca.fmax(above, below)
         slope = ca.jacobian(pressure.slack(lengths)[:n], lengths)
         if pressure.is_diagonal():
             own = ca.diag(slope)

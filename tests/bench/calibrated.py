@@ -10,6 +10,7 @@ Then random position targets within reach, 3 s each, and the mean of the true ti
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,11 @@ def calibrated_arm(preset: str, seed: int) -> Configuration:
 
 
 def tip_errors_percent(configuration: Configuration, targets: Array) -> Array:
-    """Distances of the true tip at rest from targets (n, 3), percent of the arm's length."""
+    """Distances of the true tip at rest from targets (n, 3), percent of the arm's length.
+
+    NaN where the arm says that a target is out of reach: what hangs longer than the nominal arm,
+    and has no vacuum, cannot come up to it.
+    """
     bench = Bench(configuration=configuration).activate()
     length_m = configuration.build_simulated_arm().total_rest_length_m
     errors = []
@@ -46,6 +51,9 @@ def tip_errors_percent(configuration: Configuration, targets: Array) -> Array:
         newest = bench.run(SECONDS, PositionTarget(position_m))
         ticks = bench.ticks()[-round(AVERAGED_S * RATE_HZ) :]
         bench.records.clear()
+        if newest["reach"] == Reach.OUT_OF_REACH:
+            errors.append(math.nan)
+            continue
         if newest["reach"] != Reach.REACHED:
             raise RuntimeError(f"target {position_m} m is not reached by the commanded arm")
         tip = ticks["tip_true_position_m"].mean(axis=0)
@@ -67,8 +75,11 @@ def measure(preset: str, seed: int, number: int = TARGETS) -> dict[str, Any]:
     targets = targets_of(preset, seed, number)
     before = tip_errors_percent(configuration_of(preset, RATE_HZ, seed), targets)
     after = tip_errors_percent(calibrated_arm(preset, seed), targets)
+    both = np.isfinite(before) & np.isfinite(after)
+    before, after = before[both], after[both]
     return {
         "seed": seed,
+        "targets": int(both.sum()),
         "before_percent": {"mean": before.mean(), "max": before.max()},
         "after_percent": {"mean": after.mean(), "max": after.max()},
         "times_smaller": before.mean() / after.mean(),

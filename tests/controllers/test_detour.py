@@ -60,7 +60,7 @@ def test_a_calibrated_arm_comes_as_near_as_its_pressures_let_it() -> None:
         position = vented + 0.025 * np.array([np.cos(angle), np.sin(angle), -0.4])
         controller = starting_at(arm, hanging)
         target = PositionTarget(position, nearest_lengths_m=nearest_in_box(arm, position))
-        *_, last = path(arm, controller, target, 12.0)
+        *_, last = path(arm, controller, target, 3.0)
         assert controller.reach == Reach.OUT_OF_REACH
         best_m = nearest_in_pressures_m(arm, position)
         assert distance_m(arm, last, position) < best_m + 2e-4
