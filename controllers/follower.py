@@ -140,7 +140,6 @@ class Follower:
     def _pass(self, reference: Reference, position: list[float], velocity: list[float]) -> None:
         """Be at a position now and move on with a velocity, which is zero unless it streams."""
         zeros, moving = [0.0] * len(position), any(velocity)
-
         start_s = self._lead.ahead_s
 
         def at(ahead_s: float) -> Motion:

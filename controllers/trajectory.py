@@ -192,7 +192,7 @@ class Reference:
     def step(self, dt_s: float) -> Motion:
         """Move on by one tick; return where the reference is then.
 
-        The goal's own time began when it was given to :meth:`go`.
+        The goal's own time began when it was given to :meth:`go` or :meth:`stream`.
         """
         self._since_s += dt_s
         self._plan_s += dt_s

@@ -149,16 +149,14 @@ def write_page(page: Path, text: str) -> None:
 def write_again(page: Path, report: Report) -> None:
     """Put the rows of some faults in the place of those that stand in the page, and say so."""
     _, known, _ = _parts(page)
-    new = {f"| {row.fault.name} |": row for row in report.rows}
-    rows = report.table().splitlines()[2:]
+    heads = [f"| {row.fault.name} |" for row in report.rows]
+    new = dict(zip(heads, report.table().splitlines()[2:], strict=True))
     own = tuple(f"- {row.fault.name}{mark}" for row in report.rows for mark in (":", ", seed"))
-    lines = []
-    for line in known.strip().splitlines():
-        name = next((name for name in new if line.startswith(name)), None)
-        if name is not None:
-            line = next(row for row in rows if row.startswith(name))
-        if not line.startswith(own):
-            lines.append(line)
+    lines = [
+        next((new[head] for head in heads if line.startswith(head)), line)
+        for line in known.strip().splitlines()
+        if not line.startswith(own)
+    ]
     names = ", ".join(row.fault.name for row in report.rows)
     injections = sum(len(row.injections) for row in report.rows)
     lines += [
