@@ -23,7 +23,7 @@ demo: setup
 
 # Every fault that docs/safety.md names, TIMES times at random moments; writes its table there.
 faults: setup
-	$(BIN)/python -m tests.faults --times $(TIMES) --write docs/safety.md
+	$(BIN)/python -m tools.faults --times $(TIMES) --write docs/safety.md
 
 # Two workers: processes that need their time on one, everything else on the other.
 test: check
@@ -41,20 +41,20 @@ check: setup
 	$(BIN)/lint-imports
 
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
-# The finite elements are recorded; `python -m tests.validation.finite_elements` solves them anew.
+# The finite elements are recorded; `python -m tools.validation.finite_elements` solves them anew.
 validate: bench-setup
-	$(BIN)/python -m service.validation.report --out docs
+	$(BIN)/python -m pneuarm.service.validation.report --out docs
 
 # Every benchmark, one after another, on a machine that does nothing else; writes its table.
 bench: bench-setup
-	$(BIN)/python -m tests.bench.report --write docs/benchmarks.md
+	$(BIN)/python -m tools.bench.report --write docs/benchmarks.md
 
 # The peers that the benchmarks compare with; nothing else needs them.
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 
 proto: setup
-	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. logs/schema/pneuarm.proto
+	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. pneuarm/logs/schema/pneuarm.proto
 
 # Needs uv; only for whoever changes the dependencies.
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \

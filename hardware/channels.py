@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import ConfigurationError, HardwareError
-from hardware.checked import checked_command
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
+from pneuarm.hardware.checked import checked_command
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from controllers.arm import Array
-from controllers.errors import HardwareError
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import HardwareError
 
 
 def checked_command(pressures_pa: Array, low_pa: Array, high_pa: Array, name: str) -> Array:

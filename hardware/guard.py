@@ -10,7 +10,7 @@ from math import inf
 
 import numpy as np
 
-from controllers.arm import Arm, Array
+from pneuarm.controllers.arm.arm import Arm, Array
 
 
 class Intervention(IntFlag):

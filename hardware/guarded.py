@@ -4,9 +4,9 @@ from typing import Protocol
 
 import numpy as np
 
-from controllers.arm import Array
-from hardware.guard import Guard, Guarded
-from hardware.interface import Hardware, Measurement
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.hardware.guard import Guard, Guarded
+from pneuarm.hardware.interface import Hardware, Measurement
 
 #: A device that takes whole steps of its own (1 mbar) is believed to have taken the whole: the
 #: fraction is not lost to the next slew, which at a slow slew would never get over a step.

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from controllers.arm import Array
+from pneuarm.controllers.arm.arm import Array
 
 
 @dataclass(frozen=True)

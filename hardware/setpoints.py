@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from controllers.arm import Array
+from pneuarm.controllers.arm.arm import Array
 
 #: A device may be this many writes behind.
 _REMEMBERED_WRITES = 64

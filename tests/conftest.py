@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-_REAL = ("tests.service.daemon", "tests.service.wire", "tests.service.emulators", "tests.faults")
+_REAL = ("tools.rig.daemon", "tools.rig.wire", "tools.rig.emulators", "tools.faults")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

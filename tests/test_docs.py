@@ -9,12 +9,11 @@ from google.protobuf.descriptor import Descriptor
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from hardware.simulator.parameters import SimulatorParameters
-from logs.schema import pneuarm_pb2 as pb
-from logs.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
-from service import config
-from service.mode import TABLE, Mode, ModeEvent
-from service.tables import (
+from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
+from pneuarm.service.configuration import configuration as config
+from pneuarm.service.configuration.tables import (
     arm,
     control,
     feedback,
@@ -25,6 +24,7 @@ from service.tables import (
     outputs,
     serial,
 )
+from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from service.faults import FAULTS, FaultCode, Policy
+from pneuarm.service.safety.faults import FAULTS, FaultCode, Policy
 from tests.test_docs import DOCS, rows, section
 
 

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 
-from controllers.arm import Arm
-from controllers.calibration.excitation import require_determined, require_motion
-from controllers.calibration.fit import Fit, fit
-from controllers.calibration.recording import Recording, find_rests
-from controllers.calibration.response import ResponseFit, fit_response
-from controllers.errors import CalibrationError
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.arm.errors import CalibrationError
+from pneuarm.controllers.calibration.excitation import require_determined, require_motion
+from pneuarm.controllers.calibration.fit import Fit, fit
+from pneuarm.controllers.calibration.recording import Recording, find_rests
+from pneuarm.controllers.calibration.response import ResponseFit, fit_response
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Calibration:
 
 
 def calibrate(arm: Arm, recording: Recording, in_world: bool = False) -> Calibration:
-    """Fit ``arm`` to a recording; ``in_world`` as in :func:`controllers.calibration.fit.fit`.
+    """Fit ``arm`` to a recording; ``in_world`` as in :func:`.fit.fit`.
 
     Raises CalibrationError where the recording does not show what the map needs.
     """

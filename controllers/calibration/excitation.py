@@ -6,11 +6,11 @@ it, by the standard deviations that follow from the normalised Jacobian.
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.calibration.fit import SEEN_SHARE, Fit
-from controllers.calibration.parameters import NAMES
-from controllers.calibration.recording import Recording, Rests
-from controllers.errors import CalibrationError
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import CalibrationError
+from pneuarm.controllers.calibration.fit import SEEN_SHARE, Fit
+from pneuarm.controllers.calibration.parameters import NAMES
+from pneuarm.controllers.calibration.recording import Recording, Rests
 
 #: A chamber must have rested over this share of its pressure range.
 _RANGE_SHARE = 0.25

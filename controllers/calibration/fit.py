@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from controllers.arm import Arm, Array
-from controllers.calibration.frames import Frames, aligned, in_base
-from controllers.calibration.hysteresis import play_outputs
-from controllers.calibration.model import TipModel
-from controllers.calibration.parameters import (
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.calibration.frames import Frames, aligned, in_base
+from pneuarm.controllers.calibration.hysteresis import play_outputs
+from pneuarm.controllers.calibration.model import TipModel
+from pneuarm.controllers.calibration.parameters import (
     LOWEST,
     NAMES,
     PRIOR_SD,
@@ -22,7 +22,7 @@ from controllers.calibration.parameters import (
     span_pa,
     start_of,
 )
-from controllers.calibration.recording import Recording, Rests
+from pneuarm.controllers.calibration.recording import Recording, Rests
 
 #: What a measured rest may differ from the best model (m): creep, swing, a body that is no arc.
 MODEL_SD_M = 1.5e-3
@@ -39,8 +39,8 @@ class Fit:
     """What least squares found. Tips (rests, 3) are in the measuring frame, m.
 
     ``theta`` and ``sd`` (n_sections, len(NAMES)) are scaled as in
-    :mod:`controllers.calibration.parameters`; ``share`` is the sd over the prior's: what is near 1
-    was not seen in the data.
+    :mod:`pneuarm.controllers.calibration.parameters`; ``share`` is the sd over the prior's: what is
+    near 1 was not seen in the data.
     """
 
     arm: Arm

@@ -8,7 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from controllers.arm import Array
+from pneuarm.controllers.arm.arm import Array
 
 
 def play_outputs(pressures_pa: Array, half_width_pa: Array) -> tuple[Array, Array]:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from controllers.actuation_symbols import symbolic_lengthening, symbolic_unloaded
-from controllers.arm import Arm, Array
-from controllers.calibration.parameters import SHAPING, symbolic_arm
-from controllers.kinematics.compiled import symbolic_tip
+from pneuarm.controllers.actuation.symbols import symbolic_lengthening, symbolic_unloaded
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.calibration.parameters import SHAPING, symbolic_arm
+from pneuarm.controllers.kinematics.compiled import symbolic_tip
 
 _NEWTON_STEPS = 15
 _CONVERGED_M = 1e-9

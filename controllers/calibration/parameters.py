@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Arm, Array, Section
+from pneuarm.controllers.arm.arm import Arm, Array, Section
 
 _TURN = np.array([[0.0, 1.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -1.0, 0.0]])
 _FREE = np.linalg.svd(np.array([np.eye(3).ravel(), 1.0 - np.eye(3).ravel(), _TURN.ravel()]))[2][3:]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.constant_curvature import shapes_from_lengths
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
 
 #: Largest share of the pressure range that is used.
 LARGEST_SHARE = 0.7

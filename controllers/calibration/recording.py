@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Array
-from controllers.errors import CalibrationError
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import CalibrationError
 
 #: Pressures that change no faster than this (Pa/s) count as still.
 STILL_PA_S = 3000.0

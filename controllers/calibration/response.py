@@ -12,13 +12,13 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from controllers.arm import Arm, Array, Response
-from controllers.calibration.frames import Frames
-from controllers.calibration.hysteresis import play_outputs
-from controllers.calibration.model import TipModel
-from controllers.calibration.parameters import start_of
-from controllers.calibration.recording import STILL_PA_S, Recording
-from controllers.errors import CalibrationError
+from pneuarm.controllers.arm.arm import Arm, Array, Response
+from pneuarm.controllers.arm.errors import CalibrationError
+from pneuarm.controllers.calibration.frames import Frames
+from pneuarm.controllers.calibration.hysteresis import play_outputs
+from pneuarm.controllers.calibration.model import TipModel
+from pneuarm.controllers.calibration.parameters import start_of
+from pneuarm.controllers.calibration.recording import STILL_PA_S, Recording
 
 #: The fits run on this grid (s).
 STEP_S = 0.005

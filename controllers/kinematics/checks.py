@@ -6,8 +6,8 @@ In a batch the index of the first offending element stands behind the name.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from controllers.arm import Arm, Array
-from controllers.errors import InvalidInput
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
 
 #: Largest entry of ``R^T R - 1`` at which a matrix still counts as a rotation; a quaternion that
 #: went through single precision stays below it.

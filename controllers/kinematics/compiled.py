@@ -1,7 +1,7 @@
 """Tip pose and Jacobian of a whole arm, compiled with CasADi for the tick.
 
-The same singularity-free form as :mod:`controllers.kinematics.constant_curvature`, written once
-more in CasADi symbols; the tests hold the two, and the derivative, against each other.
+The same singularity-free form as :mod:`pneuarm.controllers.kinematics.constant_curvature`, written
+once more in CasADi symbols; the tests hold the two, and the derivative, against each other.
 """
 
 from typing import Any, NamedTuple
@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import InvalidInput
-from controllers.kinematics.smooth import Smooth, from_quarter, series
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics.smooth import Smooth, from_quarter, series
 
 #: Terms of the series of the quarter angle: 1e-10 at theta = 20 rad, full precision below 4 pi.
 _TERMS = 12
@@ -31,7 +31,7 @@ class TipState(NamedTuple):
 
 
 def symbolic_smooth(theta_squared: ca.SX) -> Smooth:
-    """S, C and their kin of :mod:`controllers.kinematics.smooth`, in CasADi symbols."""
+    """S, C and their kin of :mod:`pneuarm.controllers.kinematics.smooth`, in CasADi symbols."""
     x = 0.0625 * theta_squared
     c, e = ca.SX(0), ca.SX(0)
     for next_c, next_e in series(_TERMS):
@@ -48,7 +48,7 @@ def symbolic_section(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.S
 def _section_with_jacobian(arc_length: ca.SX, u: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Position, rotation and Jacobian (6, 3) over ``(L, u, v)``, in the base of the section.
 
-    The derivative in closed form, as in :mod:`controllers.kinematics.jacobians`.
+    The derivative in closed form, as in :mod:`pneuarm.controllers.kinematics.jacobians`.
     """
     f = symbolic_smooth(u * u + v * v)
     uc, vc, us, vs = u * f.c, v * f.c, u * f.s, v * f.s

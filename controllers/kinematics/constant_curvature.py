@@ -4,15 +4,16 @@
 (rad). Lengths are ``l_i = L - d (u cos alpha_i + v sin alpha_i)``: the chamber on the inside of
 the bend is the shorter one. Nothing here divides by the bending angle, so the straight arm is a
 point like any other. Source: the paper's Eq. (1), in the twist-free tip frame
-``R = R_eq1 Rz(-phi)``; the arithmetic of batches is in :mod:`controllers.kinematics.forward`.
+``R = R_eq1 Rz(-phi)``; the arithmetic of batches is in
+:mod:`pneuarm.controllers.kinematics.forward`.
 """
 
 import numpy as np
 
-from controllers.arm import CHAMBER_ANGLES_RAD, Arm, Array
-from controllers.errors import InvalidInput
-from controllers.kinematics import checks
-from controllers.kinematics.forward import fill_ends, fill_section, shapes_of_columns
+from pneuarm.controllers.arm.arm import CHAMBER_ANGLES_RAD, Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics import checks
+from pneuarm.controllers.kinematics.forward import fill_ends, fill_section, shapes_of_columns
 
 _COS = np.cos(CHAMBER_ANGLES_RAD)
 _SIN = np.sin(CHAMBER_ANGLES_RAD)

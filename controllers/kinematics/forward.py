@@ -13,8 +13,8 @@ twist-free frame), written out.
 
 import numpy as np
 
-from controllers.arm import Array
-from controllers.kinematics.smooth import s_and_c
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.kinematics.smooth import s_and_c
 
 #: Configurations in a block: its arrays stay within some MB of cache, and numpy's cost of a call
 #: is spread over many.

@@ -1,8 +1,9 @@
 """What the weight of a whole arm does to its sections: potential energy and generalised forces.
 
 A section is an arc of even mass. Its centre of mass is ``L (u E, v E, C)`` in its base, with the
-functions of :mod:`controllers.kinematics.smooth`: the integral of the constant-curvature backbone
-in closed form, for the mean over ``s`` of ``S(s^2 q) s`` is C and that of ``C(s^2 q) s^2`` is E.
+functions of :mod:`pneuarm.controllers.kinematics.smooth`: the integral of the constant-curvature
+backbone in closed form, for the mean over ``s`` of ``S(s^2 q) s`` is C and that of ``C(s^2 q) s^2``
+is E.
 """
 
 from collections.abc import Sequence
@@ -10,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from controllers.kinematics.compiled import symbolic_section, symbolic_smooth
+from pneuarm.controllers.kinematics.compiled import symbolic_section, symbolic_smooth
 
 
 def masses_kg(mass_kg: float, sections: Sequence[Any]) -> list[Any]:

@@ -12,16 +12,16 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from controllers.arm import LENGTH_MARGIN_M, Arm, Array
-from controllers.kinematics import checks
-from controllers.kinematics.constant_curvature import (
+from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.kinematics import checks
+from pneuarm.controllers.kinematics.constant_curvature import (
     lengths_from_shapes,
     section_inverse,
     shapes_from_lengths,
     tip_transform,
 )
-from controllers.kinematics.jacobians import jacobians, shape_rates
-from controllers.kinematics.parameters import Frame, in_frame
+from pneuarm.controllers.kinematics.jacobians import jacobians, shape_rates
+from pneuarm.controllers.kinematics.parameters import Frame, in_frame
 
 #: Steps at most; from a good start ten do.
 _STEPS = 100

@@ -15,10 +15,13 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from controllers.arm import Arm, Array
-from controllers.kinematics import checks
-from controllers.kinematics.constant_curvature import section_transforms, shapes_from_lengths
-from controllers.kinematics.smooth import smooth
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics import checks
+from pneuarm.controllers.kinematics.constant_curvature import (
+    section_transforms,
+    shapes_from_lengths,
+)
+from pneuarm.controllers.kinematics.smooth import smooth
 
 Over = Literal["lengths", "shapes"]
 Seen = Literal["base", "body"]

@@ -2,7 +2,8 @@
 
 - arcs ``(phi, theta, r)``: the paper's, rad, rad, m. The straight arm has no phi and an infinite r.
 - shapes ``(L, u, v)``: arc length (m) and bending vector (rad); no singularity.
-- lengths ``(l1, l2, l3)``: chambers, m; see :mod:`controllers.kinematics.constant_curvature`.
+- lengths ``(l1, l2, l3)``: chambers, m; see
+:mod:`pneuarm.controllers.kinematics.constant_curvature`.
 
 All arrays are ``(..., 3)``.
 """
@@ -12,9 +13,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from controllers.arm import Array
-from controllers.kinematics import checks
-from controllers.kinematics.constant_curvature import lengths_from_shapes, shapes_from_lengths
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.kinematics import checks
+from pneuarm.controllers.kinematics.constant_curvature import (
+    lengths_from_shapes,
+    shapes_from_lengths,
+)
 
 #: ``twist_free`` turns with the material and is the identity for a straight arm; ``paper`` is the
 #: frame of Eq. (1), the twist-free one turned by phi about its own z axis.

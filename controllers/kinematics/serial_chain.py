@@ -1,8 +1,9 @@
 """The paper's serial robot and its equations (1), (2) and (3): the reference, not what runs.
 
 The parameters ``(phi, theta, r)`` have no meaning for the straight arm (r is infinite), so the
-controllers use :mod:`controllers.kinematics.constant_curvature` and the tests compare the two.
-Everything is defined for batches: ``phi_rad``, ``theta_rad``, ``radius_m`` broadcast to ``(...)``.
+controllers use :mod:`pneuarm.controllers.kinematics.constant_curvature` and the tests compare the
+two. Everything is defined for batches: ``phi_rad``, ``theta_rad``, ``radius_m`` broadcast to
+``(...)``.
 """
 
 from dataclasses import dataclass
@@ -11,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from controllers.arm import Array
-from controllers.kinematics import checks
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.kinematics import checks
 
 Variable = Literal["phi_rad", "theta_rad", "radius_m"]
 VARIABLES: tuple[Variable, ...] = ("phi_rad", "theta_rad", "radius_m")

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from controllers.arm import Array
+from pneuarm.controllers.arm.arm import Array
 
 #: Up to this q (rad^2, theta = 2 pi) the series are summed; above, the closed forms are exact.
 _SERIES_BELOW = 4.0 * np.pi**2

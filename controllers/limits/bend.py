@@ -3,8 +3,11 @@
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.constant_curvature import lengths_from_shapes, shapes_from_lengths
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics.constant_curvature import (
+    lengths_from_shapes,
+    shapes_from_lengths,
+)
 
 #: Far below any length that matters; keeps a division defined and a comparison safe.
 _TINY_M = 1e-12

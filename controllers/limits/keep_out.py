@@ -5,9 +5,9 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Arm, Array, KeepOut, Sphere
-from controllers.compiled_function import CompiledFunction
-from controllers.kinematics.compiled import symbolic_section, symbolic_shape
+from pneuarm.controllers.arm.arm import Arm, Array, KeepOut, Sphere
+from pneuarm.controllers.geometry.compiled_function import CompiledFunction
+from pneuarm.controllers.kinematics.compiled import symbolic_section, symbolic_shape
 
 #: Pieces of every section between two sampled stations of its backbone.
 PIECES = 10

@@ -3,8 +3,8 @@
 import casadi as ca
 import numpy as np
 
-from controllers.actuation import length_bounds_m
-from controllers.arm import Arm, Array
+from pneuarm.controllers.actuation.pressure_map import length_bounds_m
+from pneuarm.controllers.arm.arm import Arm, Array
 
 
 class LengthLimit:

@@ -3,8 +3,8 @@
 import casadi as ca
 import numpy as np
 
-from controllers.actuation import symbolic_pressures
-from controllers.arm import Arm
+from pneuarm.controllers.actuation.pressure_map import symbolic_pressures
+from pneuarm.controllers.arm.arm import Arm
 
 
 class PressureLimit:

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from controllers.arm import Array
-from controllers.tasks.wanted import Wanted
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.tasks.wanted import Wanted
 
 
 @dataclass(frozen=True)

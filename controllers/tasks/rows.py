@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from controllers.arm import Arm
-from controllers.kinematics.compiled import symbolic_tip
-from controllers.tasks.wanted import ORIENTATION_LENGTH_M
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.kinematics.compiled import symbolic_tip
+from pneuarm.controllers.tasks.wanted import ORIENTATION_LENGTH_M
 
 Parts = Mapping[str, ca.SX]
 

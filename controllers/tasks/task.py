@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from controllers.tasks.wanted import Wanted
+from pneuarm.controllers.tasks.wanted import Wanted
 
 
 class Task(Protocol):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Array
-from controllers.tasks.wanted import Wanted
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.tasks.wanted import Wanted
 
 
 def rotation_from_quaternion(quaternion_xyzw: Array) -> Array:

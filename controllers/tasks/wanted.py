@@ -1,8 +1,8 @@
 """What the tasks ask for, as one vector of parameters of the compiled step.
 
-Every task writes its part of the vector, and :mod:`controllers.tasks.rows` reads it as symbols: so
-one compiled function serves every task and every combination of them, and nothing is compiled when
-a target comes.
+Every task writes its part of the vector, and :mod:`pneuarm.controllers.tasks.rows` reads it as
+symbols: so one compiled function serves every task and every combination of them, and nothing is
+compiled when a target comes.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from controllers.arm import Array
+from pneuarm.controllers.arm.arm import Array
 
 #: One radian of orientation error weighs as much as this many metres of position error.
 ORIENTATION_LENGTH_M = 0.05

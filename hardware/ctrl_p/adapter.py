@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import ConfigurationError, HardwareError
-from hardware.channels import CallOrder, Channels, StepCommand
-from hardware.ctrl_p import protocol
-from hardware.ctrl_p.protocol import Echo, Kind, Mode, Telemetry
-from hardware.interface import Measurement
-from hardware.serial_line import SerialLine
-from hardware.setpoints import SentSetpoints
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
+from pneuarm.hardware.channels import CallOrder, Channels, StepCommand
+from pneuarm.hardware.ctrl_p import protocol
+from pneuarm.hardware.ctrl_p.protocol import Echo, Kind, Mode, Telemetry
+from pneuarm.hardware.interface import Measurement
+from pneuarm.hardware.setpoints import SentSetpoints
+from pneuarm.hardware.transports.serial_line import SerialLine
 
 WHAT = "the Ctrl-P controller"
 
@@ -53,7 +53,7 @@ class CtrlPSettings:
 
 
 class CtrlP:
-    """One controller on one port; it satisfies :class:`hardware.interface.Hardware`."""
+    """One controller on one port; it satisfies :class:`pneuarm.hardware.interface.Hardware`."""
 
     #: It regulates the last setpoints for ever, whether its host lives or not.
     has_watchdog = False

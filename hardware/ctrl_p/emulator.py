@@ -7,10 +7,10 @@ until a mode is set. Nothing here reads a clock.
 
 import numpy as np
 
-from hardware.channels import Channels
-from hardware.ctrl_p.protocol import KPA, Mode
-from hardware.emulation import EmulatedArm
-from hardware.pseudo_terminal import SlowMotion
+from pneuarm.hardware.channels import Channels
+from pneuarm.hardware.ctrl_p.protocol import KPA, Mode
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.transports.pseudo_terminal import SlowMotion
 
 _UNITS_KPA = {0: ("psi", 6.89475729), 1: ("kPa", 1.0), 2: ("bar", 100.0), 3: ("atm", 101.325)}
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import ConfigurationError, HardwareError
-from hardware.channels import CallOrder, Channels, StepCommand
-from hardware.esp32 import protocol
-from hardware.esp32.protocol import Feedback, Remark
-from hardware.interface import Measurement
-from hardware.serial_line import SerialLine
-from hardware.setpoints import SentSetpoints
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
+from pneuarm.hardware.channels import CallOrder, Channels, StepCommand
+from pneuarm.hardware.esp32 import protocol
+from pneuarm.hardware.esp32.protocol import Feedback, Remark
+from pneuarm.hardware.interface import Measurement
+from pneuarm.hardware.setpoints import SentSetpoints
+from pneuarm.hardware.transports.serial_line import SerialLine
 
 WHAT = "the ESP32 controller"
 
@@ -57,7 +57,7 @@ class Esp32Settings:
 
 
 class Esp32:
-    """One controller on one port; it satisfies :class:`hardware.interface.Hardware`.
+    """One controller on one port; it satisfies :class:`pneuarm.hardware.interface.Hardware`.
 
     ``imu_deg`` is the newest roll, pitch and yaw, NaN where there is none.
     """

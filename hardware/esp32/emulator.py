@@ -10,11 +10,11 @@ from math import asin, atan2
 
 import numpy as np
 
-from controllers.arm import Array
-from hardware.channels import Channels
-from hardware.emulation import EmulatedArm
-from hardware.esp32.protocol import CEILING_PA, CHAMBERS, KPA, PASS_S
-from hardware.pseudo_terminal import SlowMotion
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.hardware.channels import Channels
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.esp32.protocol import CEILING_PA, CHAMBERS, KPA, PASS_S
+from pneuarm.hardware.transports.pseudo_terminal import SlowMotion
 
 #: What the control of lengths raises the targets by in a pass, towards its first target, kPa.
 _LENGTH_CONTROL_KPA = 0.02

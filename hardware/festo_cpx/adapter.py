@@ -5,19 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import HardwareError
-from hardware.checked import checked_command
-from hardware.festo_cpx.protocol import (
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.checked import checked_command
+from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo_cpx.protocol import (
     CpxInputs,
     CpxLayout,
     complaint,
     counts_of,
     pressures_of,
 )
-from hardware.interface import Measurement
-from hardware.modbus import ModbusTerminal
-from hardware.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.interface import Measurement
+from pneuarm.hardware.transports.modbus import ModbusTerminal
 
 #: The terminal shows a setpoint some of its cycles late: one of these last writes must be it.
 _REMEMBERED_WRITES = 8
@@ -41,7 +41,7 @@ class CpxSettings:
 
 
 class FestoCpx:
-    """One arm on a CPX terminal. It satisfies :class:`hardware.interface.Hardware`; I/O blocks."""
+    """One arm on a CPX terminal, as a :class:`pneuarm.hardware.interface.Hardware`; I/O blocks."""
 
     def __init__(self, arm: Arm, settings: CpxSettings) -> None:
         self._arm, self._settings = arm, settings

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from hardware.emulated_watchdog import EmulatedWatchdog
-from hardware.emulation import EmulatedArm
-from hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
-from hardware.modbus import from_signed, to_signed
-from hardware.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.emulated_watchdog import EmulatedWatchdog
+from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
+from pneuarm.hardware.transports.modbus import from_signed, to_signed
 
 #: The terminal's first valve is fed by this much at most, counts of 1 mbar.
 _LARGEST_COUNT = 10_000

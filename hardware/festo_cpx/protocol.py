@@ -10,8 +10,8 @@ from math import copysign
 
 import numpy as np
 
-from controllers.arm import Array
-from hardware.modbus import from_signed, runs, to_signed
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.hardware.transports.modbus import from_signed, runs, to_signed
 
 #: Pa of one count.
 COUNT_PA = 100.0

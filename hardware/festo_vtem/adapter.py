@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import HardwareError
-from hardware.checked import checked_command
-from hardware.festo_cpx.protocol import counts_of, pressures_of
-from hardware.festo_vtem.protocol import (
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.checked import checked_command
+from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo_cpx.protocol import counts_of, pressures_of
+from pneuarm.hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
     IDLE,
     OFF,
@@ -22,9 +23,8 @@ from hardware.festo_vtem.protocol import (
     VtemLayout,
     app_and_state,
 )
-from hardware.interface import Measurement
-from hardware.modbus import ModbusTerminal
-from hardware.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.interface import Measurement
+from pneuarm.hardware.transports.modbus import ModbusTerminal
 
 NAME = "festo_vtem"
 
@@ -49,7 +49,7 @@ class VtemSettings:
 
 
 class FestoVtem:
-    """One arm on a VTEM. It satisfies :class:`hardware.interface.Hardware`; I/O blocks."""
+    """One arm on a VTEM. It satisfies :class:`pneuarm.hardware.interface.Hardware`; I/O blocks."""
 
     def __init__(
         self, arm: Arm, settings: VtemSettings, sleep: Callable[[float], None] = time.sleep

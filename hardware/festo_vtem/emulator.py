@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hardware.emulated_watchdog import EmulatedWatchdog
-from hardware.emulation import EmulatedArm
-from hardware.festo_cpx.emulator import measured_counts, read_from
-from hardware.festo_cpx.protocol import COUNT_PA
-from hardware.festo_vtem.protocol import (
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.emulated_watchdog import EmulatedWatchdog
+from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo_cpx.emulator import measured_counts, read_from
+from pneuarm.hardware.festo_cpx.protocol import COUNT_PA
+from pneuarm.hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
     IDLE,
     OFF,
@@ -19,8 +20,7 @@ from hardware.festo_vtem.protocol import (
     VtemLayout,
     command_word,
 )
-from hardware.modbus import to_signed
-from hardware.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.transports.modbus import to_signed
 
 #: How long a slot takes to load pressure regulation.
 _LOAD_S = 0.3

@@ -7,7 +7,7 @@ bits 6 and 7 the control. Status: bits 0 to 5 the app, bits 6 and 7 its state.
 
 from dataclasses import dataclass
 
-from hardware.modbus import from_signed, runs, to_signed
+from pneuarm.hardware.transports.modbus import from_signed, runs, to_signed
 
 PRESSURE_REGULATION, ACKNOWLEDGE, OFF = 3, 62, 61
 REGULATING, IDLE = 2, 1  # states

@@ -4,12 +4,12 @@ from math import ceil
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import HardwareError
-from hardware.interface import Measurement
-from hardware.simulator.parameters import SimulatorParameters, draw
-from hardware.simulator.pneumatics import Chamber, Valve
-from hardware.simulator.rod import Rod
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.interface import Measurement
+from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
+from pneuarm.hardware.simulator.pneumatics import Chamber, Valve
+from pneuarm.hardware.simulator.rod import Rod
 
 #: Longest step of the physics; a longer time between two reads is cut into equal parts.
 LARGEST_STEP_S = 2.5e-3
@@ -38,8 +38,9 @@ class _Noise:
 class SimulatedArm:
     """An arm of air and mass that obeys other equations than the controller's.
 
-    It satisfies :class:`hardware.interface.Hardware`. Nothing here reads a clock: the same calls
-    with the same seed give the same bits. ``drawn`` holds every parameter for the session log.
+    It satisfies :class:`pneuarm.hardware.interface.Hardware`. Nothing here reads a clock: the same
+    calls with the same seed give the same bits. ``drawn`` holds every parameter for the session
+    log.
     """
 
     #: It lives in its host's memory: when the host ends, no pressure is left.

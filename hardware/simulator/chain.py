@@ -1,8 +1,9 @@
 """A chain of sub-segments and its lumps, compiled with CasADi for the simulator's step.
 
 Each sub-segment is a short arc with coordinates ``(L, u, v)`` as in
-:mod:`controllers.kinematics.constant_curvature`: its own length (m) and bending vector (rad). A
-lump sits at the far end of each. Since every sub-segment bends by itself, the whole is no arc.
+:mod:`pneuarm.controllers.kinematics.constant_curvature`: its own length (m) and bending vector
+(rad). A lump sits at the far end of each. Since every sub-segment bends by itself, the whole is no
+arc.
 """
 
 from dataclasses import dataclass
@@ -11,8 +12,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from controllers.arm import Array
-from controllers.kinematics.compiled import symbolic_section
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.kinematics.compiled import symbolic_section
 
 
 def _segment() -> ca.Function:

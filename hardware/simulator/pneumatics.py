@@ -5,9 +5,9 @@ from math import exp
 
 import numpy as np
 
-from controllers.actuation import PressureMap
-from controllers.arm import Arm, Array
-from hardware.simulator.parameters import SimulatorParameters
+from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.hardware.simulator.parameters import SimulatorParameters
 
 
 class Play:

@@ -9,11 +9,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from controllers.arm import CHAMBER_ANGLES_RAD, Arm, Array
-from controllers.errors import InvalidInput
-from hardware.simulator.chain import Chain
-from hardware.simulator.parameters import DrawnParameters, SimulatorParameters
-from hardware.simulator.statics import LoadedChain, equilibrium, lowest_mode, stiffness_for_mode
+from pneuarm.controllers.arm.arm import CHAMBER_ANGLES_RAD, Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.hardware.simulator.chain import Chain
+from pneuarm.hardware.simulator.parameters import DrawnParameters, SimulatorParameters
+from pneuarm.hardware.simulator.statics import (
+    LoadedChain,
+    equilibrium,
+    lowest_mode,
+    stiffness_for_mode,
+)
 
 #: First frequency of a clamped beam over sqrt(EI / (m L^3)): where the search for EI starts.
 _BEAM_FREQUENCY = 3.516

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Array
-from controllers.errors import InvalidInput
-from hardware.simulator.chain import Chain
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.hardware.simulator.chain import Chain
 
 #: Newton's method: no bending component moves further than this in one step (rad).
 _LARGEST_STEP_RAD = 0.2

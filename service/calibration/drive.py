@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from controllers.calibration.plan import Move, duration_s
-from controllers.calibration.recording import Recording
-from controllers.errors import CalibrationError, ModeRefused, PneuarmError
-from logs.schema import pneuarm_pb2 as pb
-from logs.tick import ticks_from_states
-from service.calibration.recordings import recording_of
-from service.client import Client
+from pneuarm.controllers.arm.errors import CalibrationError, ModeRefused, PneuarmError
+from pneuarm.controllers.calibration.plan import Move, duration_s
+from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.logs.rings.tick import ticks_from_states
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.calibration.recordings import recording_of
+from pneuarm.service.client.client import Client
 
 _REFRESH_S = 0.02
 _POLL_S = 0.002

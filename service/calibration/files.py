@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from controllers.arm import Array, Response, Section
-from controllers.calibration.calibrate import Calibration
-from controllers.calibration.frames import Frames
-from controllers.errors import ConfigurationError
-from controllers.frames import Transform, rotation_vector
-from service.calibration.values import residuals_text, value_text, values
-from service.config import Configuration, check
-from service.tables.frames import FramesConfig
-from service.tables.table import BAR, DEG, MM
+from pneuarm.controllers.arm.arm import Array, Response, Section
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.calibration.calibrate import Calibration
+from pneuarm.controllers.calibration.frames import Frames
+from pneuarm.controllers.geometry.frames import Transform, rotation_vector
+from pneuarm.service.calibration.values import residuals_text, value_text, values
+from pneuarm.service.configuration.configuration import Configuration, check
+from pneuarm.service.configuration.tables.frames import FramesConfig
+from pneuarm.service.configuration.tables.table import BAR, DEG, MM
 
 #: Name of a capture system that had none before its frame was found.
 MOCAP_FRAME = "mocap"

@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 
-from controllers.calibration.calibrate import Calibration
-from service.calibration.pictures import pictures
-from service.calibration.values import Value, coupling_deviations, residuals_text, values
+from pneuarm.controllers.calibration.calibrate import Calibration
+from pneuarm.service.calibration.pictures import pictures
+from pneuarm.service.calibration.values import Value, coupling_deviations, residuals_text, values
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 72em; padding: 0 1em;

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.arm import Arm
-from controllers.calibration.recording import Recording, fresh_tips
-from controllers.errors import CalibrationError, ConfigurationError, LogError
-from logs.reader import LogReader
-from service.config import Configuration, check
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.arm.errors import CalibrationError, ConfigurationError, LogError
+from pneuarm.controllers.calibration.recording import Recording, fresh_tips
+from pneuarm.logs.reading.reader import LogReader
+from pneuarm.service.configuration.configuration import Configuration, check
 
 #: Samples are this far apart, as on the wire.
 SAMPLE_S = 0.01
 
 
 def recording_of(ticks: np.ndarray) -> Recording:
-    """Recording of ticks (see :mod:`logs.tick`), thinned to 100 a second, from the tip measured.
+    """Recording of ticks (see :mod:`pneuarm.logs.rings.tick`) thinned to 100 a second, by the tip.
 
     A tip pose is put where it was received, not where the tick read it.
     """

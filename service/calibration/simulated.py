@@ -9,22 +9,22 @@ import time
 
 import numpy as np
 
-from controllers.arm import Array
-from controllers.calibration.calibrate import calibrate
-from controllers.calibration.plan import duration_s, plan
-from controllers.calibration.recording import Recording
-from controllers.targets import PressuresTarget
-from logs.schema import pneuarm_pb2 as pb
-from logs.status import Disk
-from logs.tick import tick_dtype
-from service import backends
-from service.calibration.drive import progress
-from service.calibration.files import calibrated
-from service.commands import Command, Heartbeat, RequestMode, SetTarget
-from service.config import Configuration
-from service.loop import Loop, LoopSettings, Timing
-from service.mode import Mode, ModeEvent
-from service.mode_keeper import Timeouts
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.calibration.calibrate import calibrate
+from pneuarm.controllers.calibration.plan import duration_s, plan
+from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.controllers.targets.targets import PressuresTarget
+from pneuarm.logs.rings.status import Disk
+from pneuarm.logs.rings.tick import tick_dtype
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.calibration.drive import progress
+from pneuarm.service.calibration.files import calibrated
+from pneuarm.service.configuration.configuration import Configuration
+from pneuarm.service.control.loop import Loop, LoopSettings, Timing
+from pneuarm.service.devices import registry as backends
+from pneuarm.service.modes.mode import Mode, ModeEvent
+from pneuarm.service.modes.mode_keeper import Timeouts
+from pneuarm.service.processes.pipe import Command, Heartbeat, RequestMode, SetTarget
 
 _PERIOD_NS = 4_000_000
 _SAMPLE_TICKS = 3

@@ -5,11 +5,11 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from controllers.errors import ConfigurationError
-from service import backends
-from service.config import Configuration, load
-from service.doctor import device, machine, places, rights, timing
-from service.doctor.finding import Finding, Verdict, summary
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.service.configuration.configuration import Configuration, load
+from pneuarm.service.devices import registry as backends
+from pneuarm.service.doctor import device, machine, places, rights, timing
+from pneuarm.service.doctor.finding import Finding, Verdict, summary
 
 _PATIENT = ("ports", "device")
 

@@ -7,9 +7,9 @@ import shlex
 import socket
 import time
 
-from service.config import Configuration
-from service.devices import serial_paths, tcp_address
-from service.doctor.finding import Finding, Verdict
+from pneuarm.service.configuration.configuration import Configuration
+from pneuarm.service.devices.access import serial_paths, tcp_address
+from pneuarm.service.doctor.finding import Finding, Verdict
 
 _NAME = "device"
 _PATIENCE_S = 1.0

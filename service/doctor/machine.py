@@ -4,7 +4,7 @@ import os
 import time
 from pathlib import Path
 
-from service.doctor.finding import Finding, Verdict
+from pneuarm.service.doctor.finding import Finding, Verdict
 
 _ROOT = Path("/")
 _GOOD_CLOCKS = ("tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page")

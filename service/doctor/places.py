@@ -11,13 +11,13 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from controllers.errors import ConfigurationError
-from logs.rings import HOLD_S
-from logs.tick import tick_dtype
-from service import backends
-from service.config import Configuration, log_directory
-from service.doctor.finding import Finding, Verdict
-from service.local_stop import lock
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.logs.rings.rings import HOLD_S
+from pneuarm.logs.rings.tick import tick_dtype
+from pneuarm.service.configuration.configuration import Configuration, log_directory
+from pneuarm.service.daemon.local_stop import lock
+from pneuarm.service.devices import registry as backends
+from pneuarm.service.doctor.finding import Finding, Verdict
 
 _MIB = 1024 * 1024
 _PROBE_MIB = 16
@@ -101,7 +101,7 @@ def other_daemon(configuration: Configuration) -> Finding:
 
 def ports(configuration: Configuration) -> Finding:
     """See whether Zenoh and Rerun can listen where they are told to."""
-    from service.network import check_free
+    from pneuarm.service.network.sessions import check_free
 
     name, wanted = "ports", [("zenoh.listen", text) for text in configuration.zenoh.listen]
     if configuration.rerun.enabled:

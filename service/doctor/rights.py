@@ -5,7 +5,7 @@ import os
 import resource
 from pathlib import Path
 
-from service.doctor.finding import Finding, Verdict
+from pneuarm.service.doctor.finding import Finding, Verdict
 
 _CAP_IPC_LOCK, _CAP_SYS_NICE = 14, 23
 _LIMITS = "/etc/security/limits.d/99-pneuarm.conf"

@@ -5,11 +5,11 @@ import time
 
 import numpy as np
 
-from service import realtime
-from service.clock import Clock
-from service.doctor.finding import Finding, Verdict
-from service.doctor.rights import in_container
-from service.tables.control import ControlConfig
+from pneuarm.service.configuration.tables.control import ControlConfig
+from pneuarm.service.control.clock import Clock
+from pneuarm.service.doctor.finding import Finding, Verdict
+from pneuarm.service.doctor.rights import in_container
+from pneuarm.service.processes import realtime
 
 _STATUS_OFFSET = 40  # of `status` in struct timex, on 64 bits
 _STA_UNSYNC = 0x40

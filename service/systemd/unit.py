@@ -8,9 +8,9 @@ import sys
 from importlib.resources import files
 from pathlib import Path
 
-from controllers.errors import ConfigurationError
-from service.config import Configuration, load
-from service.devices import serial_paths
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.service.configuration.configuration import Configuration, load
+from pneuarm.service.devices.access import serial_paths
 
 
 def systemd(arguments: argparse.Namespace) -> int:
@@ -39,7 +39,7 @@ def unit_text(configuration: Configuration, path: Path | None, user: str) -> str
     if configuration.log.directory:
         directory = Path(configuration.log.directory).expanduser().resolve()
         own.append(f"ReadWritePaths={_quoted(f'-{directory}')}")
-    template = files("service.systemd").joinpath("pneuarm.service").read_text()
+    template = files("pneuarm.service.systemd").joinpath("pneuarm.service").read_text()
     return template.format(
         arm=configuration.arm.name,
         command=" ".join(_quoted(part).replace("$", "$$") for part in command),

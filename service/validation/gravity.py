@@ -7,9 +7,10 @@ length and the angle ``psi`` from the vertical the moments about every point giv
     psi'' = (W L^2 / EI) (1 - s) sin(psi),   psi(0) = 0,   psi'(1) = theta
 
 (the elastica of Euler, 1744, with natural curvature and distributed weight). ``theta`` and ``L``
-come from the pressure as identified in :mod:`service.validation.table1`; what is fitted to the
-measured positions is ``W/EI`` (1/m^2, W the arm's whole weight) and a zero offset of the length,
-which the paper names among its errors. Without weight the curve is the constant-curvature arc.
+come from the pressure as identified in :mod:`pneuarm.service.validation.table1`; what is fitted to
+the measured positions is ``W/EI`` (1/m^2, W the arm's whole weight) and a zero offset of the
+length, which the paper names among its errors. Without weight the curve is the constant-curvature
+arc.
 """
 
 from dataclasses import dataclass
@@ -18,10 +19,10 @@ import numpy as np
 from scipy.integrate import solve_bvp
 from scipy.optimize import least_squares
 
-from controllers.arm import Array
-from controllers.errors import InvalidInput
-from controllers.kinematics.constant_curvature import section_inverse
-from service.validation.table1 import BAR, MM, IdentifiedArm, Table, identify
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics.constant_curvature import section_inverse
+from pneuarm.service.validation.table1 import BAR, MM, IdentifiedArm, Table, identify
 
 _NODES = 21
 _TOLERANCE = 1e-10

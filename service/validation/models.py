@@ -11,18 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from controllers.actuation import length_bounds_m
-from controllers.arm import Arm, Array
-from controllers.errors import InvalidInput
-from controllers.kinematics.constant_curvature import shapes_from_lengths
-from controllers.kinematics.models.allen import Allen
-from controllers.kinematics.models.cosserat_rod import CosseratRod, three_springs
-from controllers.kinematics.models.della_santina import DellaSantina
-from controllers.kinematics.models.godage import Godage
-from controllers.kinematics.models.jones_walker import JonesWalker
-from controllers.kinematics.models.model import Model
-from controllers.kinematics.models.paper import PaperEquation1, SingularityFree
-from controllers.kinematics.models.webster_jones import WebsterJones
+from pneuarm.controllers.actuation.pressure_map import length_bounds_m
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
+from pneuarm.controllers.kinematics.models.allen import Allen
+from pneuarm.controllers.kinematics.models.cosserat_rod import CosseratRod, three_springs
+from pneuarm.controllers.kinematics.models.della_santina import DellaSantina
+from pneuarm.controllers.kinematics.models.godage import Godage
+from pneuarm.controllers.kinematics.models.jones_walker import JonesWalker
+from pneuarm.controllers.kinematics.models.model import Model
+from pneuarm.controllers.kinematics.models.paper import PaperEquation1, SingularityFree
+from pneuarm.controllers.kinematics.models.webster_jones import WebsterJones
 
 STANDARD_GRAVITY_M_S2 = 9.81
 #: How the arm is mounted: gravity in its base frame.

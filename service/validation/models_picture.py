@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.constant_curvature import lengths_from_shapes
-from controllers.kinematics.models.paper import SingularityFree
-from service.validation.models import (
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics.constant_curvature import lengths_from_shapes
+from pneuarm.controllers.kinematics.models.paper import SingularityFree
+from pneuarm.service.validation.models import (
     MOUNTINGS,
     all_models,
     reference_rod,

@@ -1,6 +1,6 @@
 """The comparison of the models as JSON, Markdown and a picture.
 
-``python -m service.validation.models_report [--out DIR] [--samples N]``; the picture needs
+``python -m pneuarm.service.validation.models_report [--out DIR] [--samples N]``; the picture needs
 matplotlib.
 """
 
@@ -8,12 +8,12 @@ import argparse
 import json
 from pathlib import Path
 
-from controllers.arm import Arm
-from service.config import load
-from service.validation.gravity import fit_rows
-from service.validation.models import MOUNTINGS, ModelResult, NearStraight, as_json, compare
-from service.validation.table1 import identify, read_table
-from service.validation.text import markdown_table
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.service.configuration.configuration import load
+from pneuarm.service.validation.gravity import fit_rows
+from pneuarm.service.validation.models import MOUNTINGS, ModelResult, NearStraight, as_json, compare
+from pneuarm.service.validation.table1 import identify, read_table
+from pneuarm.service.validation.text import markdown_table
 
 
 def paper_arm() -> Arm:
@@ -80,7 +80,7 @@ def _percent(value: float) -> str:
 
 def write(directory: Path, count: int) -> list[ModelResult]:
     """Compare, and write models.json, models.md and models.png into ``directory``."""
-    from service.validation.models_picture import draw
+    from pneuarm.service.validation.models_picture import draw
 
     weight, arm = table1_weight_over_bending_per_m3(), paper_arm()
     results = compare(arm, weight, count)

@@ -1,4 +1,4 @@
-"""Writes docs/validation.md and its pictures: ``python -m service.validation.report [--out DIR]``.
+"""Writes docs/validation.md: ``python -m pneuarm.service.validation.report [--out DIR]``.
 
 Every section is a function without arguments that returns its Markdown; the pictures lie beside
 the document in ``images/``. The figures of the kinematics, of the workspace and of the finite
@@ -12,16 +12,16 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from service.validation.models import compare
-from service.validation.models_report import (
+from pneuarm.service.validation.models import compare
+from pneuarm.service.validation.models_report import (
     errors_table,
     failures_table,
     paper_arm,
     table1_weight_over_bending_per_m3,
 )
-from service.validation.table1 import read_table
-from service.validation.table1_report import parameters_text, table1_report, table_cells
-from service.validation.text import markdown_table
+from pneuarm.service.validation.table1 import read_table
+from pneuarm.service.validation.table1_report import parameters_text, table1_report, table_cells
+from pneuarm.service.validation.text import markdown_table
 
 #: A section returns its Markdown, its title first, without an empty line at the end.
 Section = Callable[[], str]
@@ -123,11 +123,11 @@ def _exists(module: str) -> bool:
 
 #: The document, in its order.
 SECTIONS: tuple[Section, ...] = (
-    from_module("Kinematics", "tests.validation.figures_kinematics"),
-    from_module("Workspace", "tests.validation.figures_workspace"),
+    from_module("Kinematics", "tools.validation.figures_kinematics"),
+    from_module("Workspace", "tools.validation.figures_workspace"),
     table1,
     gravity,
-    from_module("Finite elements", "tests.validation.finite_elements.report"),
+    from_module("Finite elements", "tools.validation.finite_elements.report"),
     models,
 )
 
@@ -142,7 +142,7 @@ def write_document(directory: Path, sections: tuple[Section, ...] = SECTIONS) ->
 
 def draw_pictures(directory: Path) -> None:
     """Draw the picture of the models into ``directory``."""
-    from service.validation.models_picture import draw
+    from pneuarm.service.validation.models_picture import draw
 
     directory.mkdir(parents=True, exist_ok=True)
     draw(paper_arm(), table1_weight_over_bending_per_m3(), directory / _MODELS_PICTURE)

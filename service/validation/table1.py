@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.actuation import PressureMap
-from controllers.arm import Arm, Array, Section
-from controllers.errors import ConfigurationError
-from controllers.kinematics.constant_curvature import section_inverse, tip_transform
+from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.arm.arm import Arm, Array, Section
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.kinematics.constant_curvature import section_inverse, tip_transform
 
 MM, BAR = 1e-3, 1e5
 #: The experiment lengthens two chambers: the arm bends toward the third, here along x.
@@ -103,7 +103,7 @@ def read_table(path: Path | None = None) -> Table:
     Raises ConfigurationError for a file that cannot be read, other columns, a value that is no
     number above zero, or less than three rows.
     """
-    source = path or files("service.validation").joinpath("table1.csv")
+    source = path or files("pneuarm.service.validation").joinpath("table1.csv")
     try:
         rows = list(csv.DictReader(source.read_text().splitlines()))
     except (OSError, UnicodeDecodeError) as error:

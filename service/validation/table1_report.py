@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from controllers.arm import Array
-from service.validation.gravity import CrossValidation, cross_validate, measured_m
-from service.validation.table1 import BAR, MM, IdentifiedArm, Table, identify
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.service.validation.gravity import CrossValidation, cross_validate, measured_m
+from pneuarm.service.validation.table1 import BAR, MM, IdentifiedArm, Table, identify
 
 
 def table1_report(table: Table) -> dict[str, Any]:

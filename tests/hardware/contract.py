@@ -13,25 +13,25 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from hardware.channels import Channels
-from hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
-from hardware.ctrl_p.emulator import CtrlPEmulator
-from hardware.ctrl_p.protocol import STEP_PA as CTRL_P_STEP_PA
-from hardware.emulation import EmulatedArm
-from hardware.esp32.adapter import Esp32, Esp32Settings
-from hardware.esp32.emulator import Esp32Emulator
-from hardware.esp32.protocol import PASS_S as ESP32_PASS_S
-from hardware.esp32.protocol import STEP_PA as ESP32_STEP_PA
-from hardware.interface import Hardware
-from hardware.pseudo_terminal import PseudoTerminal
-from hardware.simulator.adapter import SimulatedArm
-from hardware.simulator.parameters import SimulatorParameters
-from logs.replay_device import ReplayDevice
-from service.config import load
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.hardware.channels import Channels
+from pneuarm.hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
+from pneuarm.hardware.ctrl_p.emulator import CtrlPEmulator
+from pneuarm.hardware.ctrl_p.protocol import STEP_PA as CTRL_P_STEP_PA
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.esp32.adapter import Esp32, Esp32Settings
+from pneuarm.hardware.esp32.emulator import Esp32Emulator
+from pneuarm.hardware.esp32.protocol import PASS_S as ESP32_PASS_S
+from pneuarm.hardware.esp32.protocol import STEP_PA as ESP32_STEP_PA
+from pneuarm.hardware.interface import Hardware
+from pneuarm.hardware.simulator.adapter import SimulatedArm
+from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.hardware.transports.pseudo_terminal import PseudoTerminal
+from pneuarm.logs.reading.replay_device import ReplayDevice
+from pneuarm.service.configuration.configuration import load
 from tests.hardware.example_adapter import ValveBox
 from tests.hardware.example_device import ValveBoxDevice
-from tests.logs.test_replay_device import record
+from tests.logs.reading.test_replay_device import record
 
 #: With vacuum, and without.
 ARMS = {name: load(None, name).build_arm() for name in ("paper", "table1")}

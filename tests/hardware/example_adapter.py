@@ -9,17 +9,17 @@ from contextlib import suppress
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import HardwareError
-from hardware.channels import CallOrder, StepCommand
-from hardware.interface import Measurement
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.channels import CallOrder, StepCommand
+from pneuarm.hardware.interface import Measurement
 
 MBAR = 100.0
 WHAT = "the valve box"
 
 
 class ValveBox:
-    """One box; it satisfies :class:`hardware.interface.Hardware`."""
+    """One box; it satisfies :class:`pneuarm.hardware.interface.Hardware`."""
 
     #: True only because the box itself does it. Nothing in this process can do it for the box.
     has_watchdog = True

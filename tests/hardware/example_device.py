@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from controllers.arm import Array
-from hardware.emulation import EmulatedArm
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.hardware.emulation.emulation import EmulatedArm
 
 MBAR = 100.0
 WATCHDOG_S = 0.2

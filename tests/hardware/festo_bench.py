@@ -6,17 +6,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from controllers.arm import Arm, Array
-from hardware.emulation import EmulatedArm
-from hardware.festo_cpx.adapter import CpxSettings, FestoCpx
-from hardware.festo_cpx.emulator import EmulatedCpx
-from hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
-from hardware.festo_vtem.adapter import FestoVtem, VtemSettings
-from hardware.festo_vtem.emulator import EmulatedVtem
-from hardware.festo_vtem.protocol import VtemLayout
-from hardware.modbus_server import EmulatedTerminal, ModbusServer
-from hardware.terminal_watchdog import TerminalWatchdog
-from hardware.transport_faults import TransportFaults
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo_cpx.adapter import CpxSettings, FestoCpx
+from pneuarm.hardware.festo_cpx.emulator import EmulatedCpx
+from pneuarm.hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
+from pneuarm.hardware.festo_vtem.adapter import FestoVtem, VtemSettings
+from pneuarm.hardware.festo_vtem.emulator import EmulatedVtem
+from pneuarm.hardware.festo_vtem.protocol import VtemLayout
+from pneuarm.hardware.transports.modbus_server import EmulatedTerminal, ModbusServer
+from pneuarm.hardware.transports.transport_faults import TransportFaults
 from tests.hardware.contract import Bench, Factory, RealClock
 
 #: Longer than in a laboratory: a test machine may be busier than any robot's.

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.arm import Arm, Array
-from tests.arms import PAPER_SECTION, paper_arm, table1_arm, trunk_arm
+from pneuarm.controllers.arm.arm import Arm, Array
+from tools.rig.arms import PAPER_SECTION, paper_arm, table1_arm, trunk_arm
 
 PERIOD_S = 0.005
 SLEW = PAPER_SECTION.pressure_slew_max_pa_s

@@ -1,4 +1,4 @@
-"""The contract of :class:`hardware.interface.Hardware`, kept by every adapter, for two arms."""
+"""The contract of a :class:`pneuarm.hardware.interface.Hardware`, kept by every adapter."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from controllers.arm import Array
-from controllers.errors import HardwareError
-from hardware.interface import Hardware, Measurement
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.interface import Hardware, Measurement
 from tests.hardware.contract import ARMS, DEVICES, TOLD_TOLERANCE_PA, Bench
 from tests.hardware.festo_bench import FESTO
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.arm import Array
-from controllers.errors import InvalidInput
-from hardware.emulation import DeviceRecord, EmulatedArm
-from hardware.transport_faults import TransportFaults
-from tests.arms import paper_arm
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.hardware.emulation.emulation import DeviceRecord, EmulatedArm
+from pneuarm.hardware.transports.transport_faults import TransportFaults
+from tools.rig.arms import paper_arm
 
 SETPOINTS_PA = np.array([[4e4, 2e4, -3e4]])
 

@@ -9,22 +9,33 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.errors import HardwareError
-from hardware.emulation import EmulatedArm
-from hardware.festo_cpx.adapter import FestoCpx
-from hardware.festo_cpx.emulator import EmulatedCpx
-from hardware.festo_cpx.protocol import CpxInputs, CpxLayout, complaint, counts_of, pressures_of
-from hardware.festo_vtem.adapter import FestoVtem
-from hardware.festo_vtem.emulator import EmulatedVtem
-from hardware.festo_vtem.protocol import (
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo_cpx.adapter import FestoCpx
+from pneuarm.hardware.festo_cpx.emulator import EmulatedCpx
+from pneuarm.hardware.festo_cpx.protocol import (
+    CpxInputs,
+    CpxLayout,
+    complaint,
+    counts_of,
+    pressures_of,
+)
+from pneuarm.hardware.festo_vtem.adapter import FestoVtem
+from pneuarm.hardware.festo_vtem.emulator import EmulatedVtem
+from pneuarm.hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
     OFF_COMMAND,
     REGULATE_COMMAND,
     VtemLayout,
     app_and_state,
 )
-from hardware.modbus import from_signed, milliseconds_to_registers, runs, to_signed
-from hardware.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.transports.modbus import (
+    from_signed,
+    milliseconds_to_registers,
+    runs,
+    to_signed,
+)
 from tests.hardware.contract import ARMS
 from tests.hardware.festo_bench import WATCHDOG, Served, cpx_settings, vtem_settings
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware import guard as guard_module
-from hardware.guard import Guard, Intervention
+from pneuarm.hardware import guard as guard_module
+from pneuarm.hardware.guard import Guard, Intervention
 from tests.hardware.guard_checks import CHECKS, HIGH, LOW, Check, filled, ready, safe_over
 
 #: What may come from upstream, broken or not.
@@ -56,4 +56,4 @@ def test_the_guard_imports_nothing_of_ours_but_the_arm_and_the_errors() -> None:
         name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names
     }
     ours = {name for name in modules if name and name.split(".")[0] in ("controllers", "hardware")}
-    assert ours <= {"controllers.arm", "controllers.errors"}
+    assert ours <= {"pneuarm.controllers.arm.arm", "pneuarm.controllers.arm.errors"}

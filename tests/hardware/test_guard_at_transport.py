@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from controllers.arm import Array
-from hardware.guard import Guard, Intervention
-from hardware.guarded import GuardedDevice
-from hardware.simulator.adapter import SimulatedArm
-from hardware.simulator.parameters import SimulatorParameters
-from tests.arms import paper_arm
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.hardware.guard import Guard, Intervention
+from pneuarm.hardware.guarded import GuardedDevice
+from pneuarm.hardware.simulator.adapter import SimulatedArm
+from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from tools.rig.arms import paper_arm
 
 ARM = paper_arm()
 

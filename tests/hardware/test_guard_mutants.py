@@ -4,7 +4,7 @@ import inspect
 
 import numpy as np
 
-from hardware import guard
+from pneuarm.hardware import guard
 from tests.hardware.guard_checks import CHECKS
 from tests.hardware.mutants import load, mutants
 

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.arm import Array
-from controllers.errors import HardwareError
-from hardware.guard import Guard, Intervention
-from hardware.guarded import GuardedDevice
-from hardware.interface import Measurement
-from tests.arms import PAPER_SECTION, paper_arm
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.guard import Guard, Intervention
+from pneuarm.hardware.guarded import GuardedDevice
+from pneuarm.hardware.interface import Measurement
+from tools.rig.arms import PAPER_SECTION, paper_arm
 
 PERIOD_S = 0.005
 SLEW = PAPER_SECTION.pressure_slew_max_pa_s

@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers.arm import Arm
-from controllers.errors import ConfigurationError, HardwareError, InvalidInput
-from hardware.channels import Channels
-from hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
-from hardware.ctrl_p.emulator import CtrlPEmulator
-from hardware.emulation import EmulatedArm
-from hardware.esp32.adapter import Esp32, Esp32Settings
-from hardware.esp32.emulator import Esp32Emulator
-from hardware.interface import Hardware, Measurement
-from hardware.pseudo_terminal import PseudoTerminal, SerialEmulator
-from hardware.serial_faults import SerialFaults
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError, InvalidInput
+from pneuarm.hardware.channels import Channels
+from pneuarm.hardware.ctrl_p.adapter import CtrlP, CtrlPSettings
+from pneuarm.hardware.ctrl_p.emulator import CtrlPEmulator
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.esp32.adapter import Esp32, Esp32Settings
+from pneuarm.hardware.esp32.emulator import Esp32Emulator
+from pneuarm.hardware.interface import Hardware, Measurement
+from pneuarm.hardware.transports.pseudo_terminal import PseudoTerminal, SerialEmulator
+from pneuarm.hardware.transports.serial_faults import SerialFaults
 from tests.hardware.contract import ARMS
-from tests.service.daemon import wait_for
+from tools.rig.daemon import wait_for
 
 PAPER = ARMS["paper"]
 SOFT = Arm("soft", (replace(PAPER.sections[0], pressure_min_pa=0.0, pressure_max_pa=1.2e4),))

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from controllers.arm import Arm
-from controllers.errors import ConfigurationError
-from hardware import ctrl_p, esp32
-from hardware.channels import Channels, StepCommand
-from hardware.ctrl_p.protocol import Echo, Kind, Mode, Telemetry
-from hardware.esp32.protocol import Feedback, Remark
-from tests.arms import TABLE1_SECTION, paper_arm, trunk_arm
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.hardware import ctrl_p, esp32
+from pneuarm.hardware.channels import Channels, StepCommand
+from pneuarm.hardware.ctrl_p.protocol import Echo, Kind, Mode, Telemetry
+from pneuarm.hardware.esp32.protocol import Feedback, Remark
+from tools.rig.arms import TABLE1_SECTION, paper_arm, trunk_arm
 
 #: Beginnings and middles of real lines, which reach deeper into a parser than noise does.
 PIECES = [

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.models.model import chained, checked_lengths, transforms
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics.models.model import chained, checked_lengths, transforms
 
 #: Below this angle (rad) the quotients are summed as series, to their fourth power.
 _SERIES_BELOW_RAD = 1e-2

@@ -1,6 +1,6 @@
 """A Cosserat rod with its own weight, solved by shooting: the reference of the other models.
 
-Equations and sources: see :mod:`controllers.kinematics.models.rod_integration`. The chamber
+Equations and sources: see :mod:`pneuarm.controllers.kinematics.models.rod_integration`. The chamber
 lengths say what the arm would be without load: in every section a natural stretch L / l0 and a
 natural curvature (u, v) / l0, constant along it, as pressure on the walls and caps of chambers
 parallel to the backbone makes them. The rod then gives way to its weight by bending, stretch,
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.arm import Arm, Array
-from controllers.errors import InvalidInput
-from controllers.kinematics.constant_curvature import shapes_from_lengths
-from controllers.kinematics.models.model import checked_lengths
-from controllers.kinematics.models.rod_integration import SectionRod, integrate
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
+from pneuarm.controllers.kinematics.models.model import checked_lengths
+from pneuarm.controllers.kinematics.models.rod_integration import SectionRod, integrate
 
 Indices = NDArray[np.intp]
 

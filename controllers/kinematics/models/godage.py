@@ -18,10 +18,10 @@ from math import factorial
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import InvalidInput
-from controllers.kinematics.constant_curvature import shapes_from_lengths
-from controllers.kinematics.models.model import chained, checked_lengths, transforms
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
+from pneuarm.controllers.kinematics.models.model import chained, checked_lengths, transforms
 
 
 def _series(theta_squared: Array, first: int, highest: int) -> Array:

@@ -2,7 +2,7 @@
 
 B. A. Jones and I. D. Walker, "Kinematics for multisection continuum robots", IEEE Transactions on
 Robotics 22(1), 2006: a section of ``n`` units, each with straight actuators between two plates;
-with ``g`` and ``phi`` as in :mod:`controllers.kinematics.models.webster_jones`
+with ``g`` and ``phi`` as in :mod:`pneuarm.controllers.kinematics.models.webster_jones`
 
     s     = n d (l1 + l2 + l3) / sqrt(g) asin( sqrt(g) / (3 n d) )
     kappa = 2 sqrt(g) / (d (l1 + l2 + l3))
@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.errors import InvalidInput
-from controllers.kinematics.models.model import chained, checked_lengths, transforms
-from controllers.kinematics.models.webster_jones import direction, radicand
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.kinematics.models.model import chained, checked_lengths, transforms
+from pneuarm.controllers.kinematics.models.webster_jones import direction, radicand
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from typing import Protocol
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics import checks
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics import checks
 
 
 class Model(Protocol):

@@ -2,7 +2,7 @@
 
 *Kinematic Modeling of a Spatial Soft Robot by an Improved Analytical Method Based on Serial
 Robots*, Eq. (1), over ``(phi, theta, r)``; and the form over ``(L, u, v)`` of
-:mod:`controllers.kinematics.constant_curvature`.
+:mod:`pneuarm.controllers.kinematics.constant_curvature`.
 
 Where Eq. (1) fails: the straight arm has no radius, ``r (1 - cos theta)`` is infinity times zero,
 NaN. Near it ``1 - cos theta`` loses its digits while ``r`` grows.
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.constant_curvature import shapes_from_lengths, tip_transform
-from controllers.kinematics.models.model import chained, checked_lengths, transforms
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths, tip_transform
+from pneuarm.controllers.kinematics.models.model import chained, checked_lengths, transforms
 
 
 @dataclass(frozen=True)

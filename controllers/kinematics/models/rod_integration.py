@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Array
+from pneuarm.controllers.arm.arm import Array
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.arm import Arm, Array
-from controllers.kinematics.models.model import chained, checked_lengths, transforms
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.kinematics.models.model import chained, checked_lengths, transforms
 
 
 def direction(lengths: Array) -> Array:

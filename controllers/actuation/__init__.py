@@ -1,0 +1,1 @@
+"""Chamber pressure to chamber length and back; hysteresis, valve lag and stiction inverted."""

@@ -1,0 +1,1 @@
+"""The arm: sections, chambers, limits, frozen; and the tree of exceptions."""

@@ -1,0 +1,1 @@
+"""The correction by a measured tip, and the estimate of what was not measured."""

@@ -1,0 +1,195 @@
+"""Disturbance observer: by how much the tip is elsewhere than the model has it.
+
+Internal-model control (Garcia and Morari, 1982): the commanded lengths go through a model of the
+arm's response, and what a measured tip pose differs from the predicted one *of the time at which it
+was taken* is the disturbance: droop, hysteresis, creep, wrong coefficients. Filtered, it is the
+correction with which the laws see the tip. The prediction is of what was really commanded, so
+nothing winds up where the arm cannot follow.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+
+from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.feedback.prediction import Prediction
+from pneuarm.controllers.geometry.frames import rotation_from_vector, rotation_vector
+from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
+
+#: Time constant (s) by which the estimate follows the measured difference, and its scatter.
+_FAST_S, _SCATTER_S = 0.02, 0.5
+
+#: A tip whose mean of 30 ms is nearer (m) than this to that of 200 ms stands still. A chamber that
+#: sticks must be pushed through its dead band; an arm that swings must not be pushed at its swing.
+_QUICK_S, _SLOW_S, _STILL_M = 0.03, 0.2, 2e-4
+
+#: The correction of a tip that stands still goes so many times faster.
+_WHEN_STILL = 2.0
+
+#: An estimate is never told to be better than this (m): no camera sees an arm more exactly.
+_LEAST_SIGMA_M = 5e-5
+
+
+@dataclass(frozen=True)
+class FeedbackSettings:
+    """How the correction follows the measured tip, and when a measurement is believed.
+
+    ``delay_s`` is the age of a pose when it arrives; after ``timeout_s`` without one the camera
+    counts as lost. A pose that is more than ``jump_max_m`` off the ones before is refused until
+    such poses have agreed with each other for ``jump_accept_s``.
+    """
+
+    enabled: bool = True
+    delay_s: float = 0.01
+    timeout_s: float = 0.1
+    time_constant_s: float = 0.17
+    rate_max_m_s: float = 0.05
+    deadband_m: float = 1e-4
+    jump_max_m: float = 0.02
+    jump_accept_s: float = 0.5
+    model_sigma_m: float = 0.025
+    length_sigma_m: float = 0.01
+    dither_pa: float = 1500.0
+    dither_period_s: float = 0.03
+    hysteresis_share: float = 0.55
+    hysteresis_share_moving: float = 0.65
+
+
+class Verdict(Enum):
+    """What became of a measured pose."""
+
+    TAKEN = auto()
+    REFUSED = auto()
+    ACCEPTED_ANEW = auto()
+
+
+class TipObserver:
+    """The correction, from measured tip poses of known age.
+
+    ``offset_m`` (3,) and ``rotation`` (3, 3) are what :meth:`Controller.set_correction` takes. They
+    are replaced, never written into.
+    """
+
+    def __init__(self, arm: Arm, settings: FeedbackSettings, period_s: float) -> None:
+        self._settings, self._period_s = settings, period_s
+        self._delay_s = arm.response.delay_s
+        self.prediction = Prediction(arm, period_s)
+        self.offset_m, self.rotation = np.zeros(3), np.eye(3)
+        self.quaternion_xyzw = quaternion_from_rotation(self.rotation)
+        self.seen = False
+        self.refused = 0
+        self._turn = np.zeros(3)
+        self._residual, self._fast = np.zeros(3), np.zeros(3)
+        self._variance_m2 = settings.model_sigma_m**2
+        self._quick, self._slow = np.zeros(3), np.zeros(3)
+        self._since_pose_s = math.inf
+        self._since_taken_s = math.inf
+        self._candidate: Array | None = None
+        self._candidate_s = 0.0
+
+    def measure(self, position_m: Array, rotation: Array, waited_s: float) -> Verdict:
+        """Take a pose that arrived so long before this tick."""
+        age_s = self._settings.delay_s + waited_s + self._delay_s
+        predicted, turned = self.prediction.ago(age_s)
+        residual = position_m - predicted
+        verdict = self._judge(residual)
+        if verdict is Verdict.REFUSED:
+            self.refused += 1
+            return verdict
+        self._take(residual, position_m, verdict is Verdict.TAKEN and self.seen)
+        self._follow_turn(rotation_vector(rotation @ turned.T))
+        return verdict
+
+    def _judge(self, residual: Array) -> Verdict:
+        """Whether a difference goes with the ones before, or has lasted long enough."""
+        settings, pause_s = self._settings, self._since_pose_s
+        self._since_pose_s = 0.0
+        never = math.isinf(self._since_taken_s)
+        largest = 3.0 * settings.model_sigma_m if never else settings.jump_max_m
+        if not never and pause_s > settings.timeout_s:  # what was not seen may have wandered
+            largest += settings.rate_max_m_s * pause_s
+        if _norm(residual - self._residual) <= largest:
+            self._candidate = None
+            return Verdict.TAKEN
+        agrees = (
+            self._candidate is not None
+            and pause_s <= settings.timeout_s
+            and _norm(residual - self._candidate) <= settings.jump_max_m
+        )
+        self._candidate_s = self._candidate_s + pause_s if agrees else 0.0
+        self._candidate = residual
+        if self._candidate_s < settings.jump_accept_s:
+            return Verdict.REFUSED
+        self._candidate = None
+        return Verdict.ACCEPTED_ANEW
+
+    def _take(self, residual: Array, position_m: Array, continued: bool) -> None:
+        pause_s = min(self._since_taken_s, 1.0)
+        self._residual = residual
+        if continued:
+            change = residual - self._fast
+            share = 1.0 - math.exp(-pause_s / _FAST_S)
+            self._fast = self._fast + share * change
+            self._quick = self._quick + min(1.0, pause_s / _QUICK_S) * (position_m - self._quick)
+            self._slow = self._slow + min(1.0, pause_s / _SLOW_S) * (position_m - self._slow)
+            rest = math.exp(-pause_s / _SCATTER_S)
+            self._variance_m2 += (1.0 - rest) * (float(change @ change) - self._variance_m2)
+        else:
+            self._fast, self._quick, self._slow = residual, position_m, position_m
+            self._variance_m2 = (0.1 * self._settings.model_sigma_m) ** 2
+        self._since_taken_s, self.seen = 0.0, True
+
+    def _follow_turn(self, turn: Array) -> None:
+        share = min(1.0, 0.01 / self._settings.time_constant_s)
+        self._turn = self._turn + share * (turn - self._turn)
+        self.rotation = rotation_from_vector(self._turn)
+        self.quaternion_xyzw = quaternion_from_rotation(self.rotation)
+
+    def step(self, lengths_m: Array) -> None:
+        """Go on by one tick under commanded lengths (n_sections, 3).
+
+        ``seen`` turns False when the camera is lost; the correction then stays as it is.
+        """
+        self.prediction.step(lengths_m)
+        self._since_pose_s += self._period_s
+        self._since_taken_s += self._period_s
+        if self._since_taken_s > self._settings.timeout_s:
+            self.seen = False
+        if not self.seen or not self._settings.enabled:
+            return
+        difference = self._fast - self.offset_m
+        size = _norm(difference)
+        if size > self._settings.deadband_m:
+            share = self._period_s / self._settings.time_constant_s
+            if _norm(self._quick - self._slow) < _STILL_M:
+                share *= _WHEN_STILL
+            share = min(share, self._settings.rate_max_m_s * self._period_s / size)
+            self.offset_m = self.offset_m + share * difference
+
+    def estimate(self) -> tuple[Array, Array]:
+        """Where the tip is now, position (3,) and rotation (3, 3).
+
+        From the prediction and the newest differences; call it after :meth:`step`.
+        """
+        position, rotation = self.prediction.ago(self._delay_s + self._period_s)
+        return position + self._fast, self.rotation @ rotation
+
+    @property
+    def length_sigma_m(self) -> float:
+        """Standard deviation of the tip where sensors measure the lengths."""
+        return self._settings.length_sigma_m
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the estimate: the scatter of the differences, growing when lost."""
+        settings = self._settings
+        if math.isinf(self._since_taken_s):
+            return settings.model_sigma_m
+        lost = 0.0 if self.seen else min(1.0, self._since_taken_s / 30.0) * settings.model_sigma_m
+        return math.sqrt(max(self._variance_m2, _LEAST_SIGMA_M**2) + lost**2)
+
+
+def _norm(vector: Array) -> float:
+    return math.sqrt(vector @ vector)

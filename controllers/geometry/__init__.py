@@ -1,0 +1,1 @@
+"""Rigid transforms, rotations, and CasADi functions called fast."""

@@ -1,0 +1,119 @@
+"""Where things are: motion capture, base, marker, tip and tool, as rigid transforms.
+
+A transform is ``(rotation (3, 3), position (3,))``: it takes coordinates of the second frame of its
+name to the first.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import InvalidInput
+
+
+@dataclass(frozen=True)
+class Transform:
+    """A rigid motion: ``x -> rotation x + position``."""
+
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    position_m: Array = field(default_factory=lambda: np.zeros(3))
+
+    def __matmul__(self, other: "Transform") -> "Transform":
+        """First the other, then this."""
+        return Transform(
+            self.rotation @ other.rotation, self.rotation @ other.position_m + self.position_m
+        )
+
+    def inverse(self) -> "Transform":
+        """Undo it."""
+        back: Array = self.rotation.T
+        return Transform(back, -(back @ self.position_m))
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """Axis times angle (3,), rad, of a rotation matrix (3, 3); angles up to pi."""
+    axial = 0.5 * np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    sine = float(np.sqrt(axial @ axial))
+    cosine = 0.5 * (float(np.trace(rotation)) - 1.0)
+    if sine > 1e-9:
+        return axial * (math.atan2(sine, cosine) / sine)
+    if cosine > 0.0:
+        return axial
+    # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
+    column = np.argmax(np.diag(rotation))
+    axis: Array = rotation[:, column] + np.eye(3)[column]
+    return axis * (math.pi / float(np.linalg.norm(axis)))
+
+
+def rotation_from_vector(vector_rad: Array) -> Array:
+    """Rotation (3, 3) about a vector (3,) by its length in rad (Rodrigues)."""
+    angle = float(np.sqrt(vector_rad @ vector_rad))
+    x, y, z = vector_rad.tolist()
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine = float(np.sinc(angle / np.pi))
+    half = float(np.sinc(0.5 * angle / np.pi))
+    rotation: Array = np.eye(3) + sine * cross + 0.5 * half * half * (cross @ cross)
+    return rotation
+
+
+def transform_of(position_m: Array, rotation_vector_rad: Array) -> Transform:
+    """Transform from a position and a rotation vector; raises InvalidInput beyond half a turn."""
+    angle = float(np.linalg.norm(rotation_vector_rad))
+    if angle > np.pi + 1e-9:
+        raise InvalidInput(
+            f"a rotation vector of {np.rad2deg(angle):.4g} degrees: at most 180 are allowed"
+        )
+    return Transform(rotation_from_vector(rotation_vector_rad), position_m)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Mountings of one arm: what a motion-capture system measures, and what targets name.
+
+    ``mocap_to_base`` takes coordinates of the capture system to the base, ``tip_to_marker`` those
+    of the tip to its marker; ``tool_m`` is the tool point in the tip frame.
+    """
+
+    mocap_frame: str = ""
+    mocap_to_base: Transform = field(default_factory=Transform)
+    tip_to_marker: Transform = field(default_factory=Transform)
+    tool_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def tool_pose(self, marker: Transform, frame_id: str) -> Transform:
+        """Pose of the tool point in the base, from the marker's pose in a frame.
+
+        Raises InvalidInput for a frame that is neither the base nor the capture system's.
+        """
+        if frame_id == "base":
+            in_base = marker
+        elif frame_id and frame_id == self.mocap_frame:
+            in_base = self.mocap_to_base @ marker
+        else:
+            known = f"'base', {self.mocap_frame!r}" if self.mocap_frame else "'base'"
+            raise InvalidInput(f"frame_id = {frame_id!r}: unknown frame; allowed: {known}")
+        tip = in_base @ self.tip_to_marker
+        return tip @ Transform(position_m=np.array(self.tool_m))
+
+    def marker_pose(self, tip: Transform) -> Transform:
+        """Pose of the marker in the capture system, from the tip's (not the tool's) in the base."""
+        return self.mocap_to_base.inverse() @ tip @ self.tip_to_marker.inverse()
+
+
+def spin_of(turn: Array, rate: Array) -> Array:
+    """Angular velocity (3,) of exp(turn) whose rotation vector changes at a rate (3,)."""
+    angle = float(np.sqrt(turn @ turn))
+    if angle < 1e-9:
+        return rate
+    axis = turn / angle
+    sine = math.sin(angle) / angle
+    along: Array = axis * (axis @ rate)
+    across = (1.0 - math.cos(angle)) / angle * np.cross(axis, rate)
+    return sine * rate + (1.0 - sine) * along + across

@@ -1,0 +1,1 @@
+"""The smooth reference between targets, and how a stream of them is followed."""

@@ -1,0 +1,287 @@
+"""From targets to what the law is given in every tick: the reference, and the lead before the arm.
+
+A new target never jumps: the reference goes on from where and how fast it is. The arm answers late,
+so the reference runs ahead of the tip by the dead time and the lag, and the law is told what the
+body must be given to be there: the inverse of the lowest mode,
+
+    u = r + (2 zeta / omega) r' + (1 / omega^2) r''
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneuarm.controllers.arm.arm import Array, Response
+from pneuarm.controllers.geometry.frames import rotation_from_vector, rotation_vector, spin_of
+from pneuarm.controllers.kinematics.compiled import TipState
+from pneuarm.controllers.reference.stream import STREAM_S, Stream
+from pneuarm.controllers.reference.trajectory import (
+    Goal,
+    Motion,
+    Reference,
+    ReferenceLimits,
+    standing,
+)
+from pneuarm.controllers.targets.targets import PoseTarget, PositionTarget, ShapeTarget, Target
+from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
+
+#: One metre of the limits allows this many radians.
+_TURN_PER_M = 10.0
+
+#: Where the law is this far (m) behind, the arm cannot follow: a new target starts at the tip.
+_LOST_M = 0.02
+
+
+@dataclass(frozen=True)
+class Lead:
+    """By how much (s) the reference runs ahead of the tip, and the inverse of the mode.
+
+    That is how much of the reference's velocity (s) and acceleration (s^2) the command goes ahead.
+    """
+
+    ahead_s: float = 0.0
+    velocity_s: float = 0.0
+    acceleration_s2: float = 0.0
+
+
+def lead_of(response: Response) -> Lead:
+    """Return the lead that undoes dead time, lag and mode.
+
+    A lag that is short beside the mode is as good as a dead time; undone as a lag, it would ask for
+    steps wherever the jerk has one.
+    """
+    omega = 2.0 * math.pi * response.mode_hz
+    ahead_s = response.delay_s + response.lag_s
+    return Lead(ahead_s, 2.0 * response.damping_ratio / omega, omega**-2)
+
+
+class Follower:
+    """Keeps the reference of position, pose and shape targets; other kinds pass it by."""
+
+    def __init__(
+        self, limits: ReferenceLimits, lead: Lead, gain_per_s: float, period_s: float
+    ) -> None:
+        turn = ReferenceLimits(
+            _TURN_PER_M * limits.speed_m_s,
+            _TURN_PER_M * limits.acceleration_m_s2,
+            _TURN_PER_M * limits.jerk_m_s3,
+        )
+        self._position, self._pose = Reference(limits), Reference(limits, turn)
+        self._lead, self._gain_per_s, self._jerk_max = lead, gain_per_s, limits.jerk_m_s3
+        self._largest_m_s = limits.speed_m_s * 3.0**-0.5
+        self._stream = Stream()
+        self._on_the_way: deque[Motion] = deque(maxlen=round(lead.ahead_s / period_s) + 1)
+        self.forget()
+
+    def forget(self) -> None:
+        """Follow nothing; the next target starts from the tip."""
+        self._target: PositionTarget | PoseTarget | ShapeTarget | None = None
+        self._reference: Reference | None = None
+        self._moving_goal = False
+        self._since_s = self._shape_s = 0.0
+        self._chart = np.eye(3)
+        self._acceleration = [0.0] * 3
+        self._stream.forget()
+        self._on_the_way.clear()
+
+    @property
+    def follows(self) -> bool:
+        """Whether there is a reference."""
+        return self._reference is not None
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the reference stands where it was to go."""
+        return self._reference is None or (self._reference.arrived and not self._moving_goal)
+
+    @property
+    def motion(self) -> Motion | None:
+        """Where the tip is to be now: the reference as it was when it was that far ahead."""
+        if self._reference is None:
+            return None
+        return self._on_the_way[0] if self._on_the_way else self._reference.now
+
+    @property
+    def goal_position(self) -> list[float]:
+        """Where a shape has its point now, met already or not."""
+        target = self._target
+        if not isinstance(target, ShapeTarget):
+            return [math.nan] * 3
+        if self._reference is not None and self._reference.arrived:
+            return self._on_the_way[0].position
+        return target.shape.at(min(self._shape_s, target.shape.duration_s)).position
+
+    @property
+    def error(self) -> str:
+        """What the generator refused about the newest target; the reference goes on as before."""
+        return "" if self._reference is None else self._reference.error
+
+    def set_target(self, target: Target, at_s: float, tip: TipState, velocity_m_s: Array) -> None:
+        """Take a target that arrived ``at_s``; the law's tip and velocity say where to start."""
+        if not isinstance(target, PositionTarget | PoseTarget | ShapeTarget):
+            self.forget()
+            return
+        if isinstance(target, ShapeTarget):
+            known = self._target
+            if isinstance(known, ShapeTarget) and known.key == target.key:
+                return
+            self._start_position(tip, velocity_m_s)
+            self._go(self._position, target.shape.at, moving=True)
+            self._shape_s = 0.0
+        elif isinstance(target, PositionTarget):
+            self._set_position(target, at_s, tip, velocity_m_s)
+        else:
+            self._set_pose(target, at_s, tip, velocity_m_s)
+        self._target = target
+
+    def _go(self, reference: Reference, goal: Goal, moving: bool) -> None:
+        reference.go(goal)
+        self._reference, self._moving_goal, self._since_s = reference, moving, 0.0
+
+    def _pass(self, reference: Reference, position: list[float], velocity: list[float]) -> None:
+        """Be at a position now and move on with a velocity, which is zero unless it streams."""
+        zeros, moving = [0.0] * len(position), any(velocity)
+        start_s = self._lead.ahead_s
+
+        def at(ahead_s: float) -> Motion:
+            moved = [p + (start_s + ahead_s) * v for p, v in zip(position, velocity, strict=True)]
+            return Motion(moved, velocity, zeros)
+
+        self._reference, self._moving_goal, self._since_s = reference, moving, 0.0
+        (reference.stream if moving else reference.go)(at)
+
+    def _velocity(self, target: PositionTarget | PoseTarget, at_s: float) -> Array:
+        streamed = self._stream.velocity(target.position_m, at_s, self._largest_m_s)
+        given = target.velocity_m_s if isinstance(target, PositionTarget) else None
+        return streamed if given is None else given
+
+    def _is_repeated(self, target: PositionTarget | PoseTarget, velocity: Array) -> bool:
+        """Whether the reference stands at this target, or is on its way to it, already."""
+        known = self._target
+        if self._moving_goal or velocity.any():
+            return False
+        if isinstance(target, PoseTarget):
+            return (
+                isinstance(known, PoseTarget)
+                and bool((known.position_m == target.position_m).all())
+                and bool((known.quaternion_xyzw == target.quaternion_xyzw).all())
+            )
+        return isinstance(known, PositionTarget) and bool(
+            (known.position_m == target.position_m).all()
+        )
+
+    def _set_position(
+        self, target: PositionTarget, at_s: float, tip: TipState, velocity_m_s: Array
+    ) -> None:
+        velocity = self._velocity(target, at_s)
+        if self._is_repeated(target, velocity):
+            return
+        self._start_position(tip, velocity_m_s)
+        self._pass(self._position, target.position_m.tolist(), velocity.tolist())
+
+    def _set_pose(
+        self, target: PoseTarget, at_s: float, tip: TipState, velocity_m_s: Array
+    ) -> None:
+        velocity = self._velocity(target, at_s)
+        if self._is_repeated(target, velocity):
+            return
+        turned = self._start_pose(tip, velocity_m_s)
+        wanted = rotation_from_quaternion(target.quaternion_xyzw)
+        turn = rotation_vector(wanted @ turned.T).tolist()
+        moves = [*velocity.tolist(), 0.0, 0.0, 0.0]
+        self._pass(self._pose, [*target.position_m.tolist(), *turn], moves)
+
+    def _linear(self, tip: TipState, velocity_m_s: Array) -> Motion:
+        """Where a new way of the position starts: at the reference, or at the tip."""
+        reference = self._reference
+        if reference is not None:
+            position, velocity, acceleration = (part[:3] for part in reference.now)
+            if math.dist(position, tip.position_m.tolist()) < self._lost_m(velocity):
+                return Motion(position, velocity, acceleration)
+        return Motion(tip.position_m.tolist(), velocity_m_s.tolist(), [0.0] * 3)
+
+    def _lost_m(self, velocity: list[float]) -> float:
+        """The law is ahead of the reference by the lead: that alone does not make it lost."""
+        return _LOST_M + 2.0 * (self._lead.ahead_s + self._lead.velocity_s) * math.hypot(*velocity)
+
+    def _start_position(self, tip: TipState, velocity_m_s: Array) -> None:
+        motion = self._linear(tip, velocity_m_s)
+        if motion != self._position.now or self._reference is not self._position:
+            self._position.start(*motion)
+
+    def _start_pose(self, tip: TipState, velocity_m_s: Array) -> Array:
+        """Start where the reference is, in a chart around its rotation, which is returned."""
+        linear, zeros = self._linear(tip, velocity_m_s), [0.0, 0.0, 0.0]
+        rotation, spin, change = tip.rotation.copy(), zeros, zeros
+        if self._reference is self._pose:
+            now = self._pose.now
+            rotation = rotation_from_vector(np.array(now.position[3:])) @ self._chart
+            spin = spin_of(np.array(now.position[3:]), np.array(now.velocity[3:])).tolist()
+            change = now.acceleration[3:]
+        self._pose.start(
+            [*linear.position, *zeros],
+            [*linear.velocity, *spin],
+            [*linear.acceleration, *change],
+        )
+        self._chart = rotation
+        return rotation
+
+    def step(self, dt_s: float) -> Target | None:
+        """Move on by one tick; return the target for the law, None where it has its own."""
+        reference = self._reference
+        if reference is None or self._target is None:
+            return None
+        self._since_s += dt_s
+        self._shape_s += dt_s
+        self._stand_in_the_end(reference)
+        motion = reference.step(dt_s)
+        self._on_the_way.append(motion)
+        by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
+        ahead = np.array(
+            [p + by_velocity * v + by_acceleration * a for p, v, a in zip(*motion, strict=True)]
+        )
+        if reference is self._position:
+            rate = np.array(self._rate(motion, dt_s))
+            return PositionTarget(ahead, self._target.law, rate, self._nearest_m())
+        # The law follows a pose by its gain alone, 1 / gain behind.
+        _, velocity, acceleration = (np.array(part) for part in motion)
+        self._acceleration = motion.acceleration[:3]
+        ahead += (velocity + by_velocity * acceleration) / self._gain_per_s
+        turned = rotation_from_vector(ahead[3:]) @ self._chart
+        return PoseTarget(ahead[:3], quaternion_from_rotation(turned), self._target.law)
+
+    def _rate(self, motion: Motion, dt_s: float) -> list[float]:
+        """Velocity (3,) of what the law is given, with the jerk within its limit."""
+        by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
+        most, rate = self._jerk_max, []
+        for v, a, before in zip(
+            motion.velocity, motion.acceleration, self._acceleration, strict=False
+        ):
+            jerk = min(max((a - before) / dt_s, -most), most)
+            rate.append(v + by_velocity * a + by_acceleration * jerk)
+        self._acceleration = motion.acceleration
+        return rate
+
+    def _nearest_m(self) -> Array | None:
+        """Lengths nearest to a position out of reach, once the reference stands there."""
+        if isinstance(self._target, PositionTarget) and self.arrived:
+            return self._target.nearest_lengths_m
+        return None
+
+    def _stand_in_the_end(self, reference: Reference) -> None:
+        """Come to rest where a shape is over, or at the last position of a stream."""
+        if not self._moving_goal:
+            return
+        target = self._target
+        if isinstance(target, ShapeTarget):
+            if self._since_s >= target.shape.duration_s and reference.arrived:
+                end = target.shape.at(target.shape.duration_s).position
+                self._go(reference, standing(end), moving=False)
+        elif self._since_s > STREAM_S and isinstance(target, PositionTarget):
+            self._go(reference, standing(target.position_m.tolist()), moving=False)
+        elif self._since_s > STREAM_S and isinstance(target, PoseTarget):
+            turn = rotation_vector(rotation_from_quaternion(target.quaternion_xyzw) @ self._chart.T)
+            end = [*target.position_m.tolist(), *turn.tolist()]
+            self._go(reference, standing(end), moving=False)

@@ -1,0 +1,1 @@
+"""What can be asked of the arm: positions, poses, twists, shapes."""

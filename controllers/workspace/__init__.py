@@ -1,0 +1,1 @@
+"""The set of positions that the tip can take: boundary, volume, nearest point."""

@@ -1,0 +1,1 @@
+"""What the two Festo terminals share: their watchdog, and its emulation."""

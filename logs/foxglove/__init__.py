@@ -1,0 +1,1 @@
+"""The arm in Foxglove's messages: frames and body."""

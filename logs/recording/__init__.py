@@ -1,0 +1,1 @@
+"""The MCAP file: written in parts, and mended after a crash."""

@@ -1,0 +1,118 @@
+"""One part of a session: an MCAP file that survives a full disk and a sudden death."""
+
+import fcntl
+import os
+from pathlib import Path
+
+from google.protobuf.message import Message
+from mcap.well_known import MessageEncoding
+from mcap.writer import CompressionType, Writer
+from mcap_protobuf.schema import register_schema
+
+from pneuarm.logs.schema.topics import Topic, full_key
+
+#: Deflate in pieces of this size, so that no single piece stalls the recorder for long.
+_CHUNK_BYTES = 256 * 1024
+
+
+class PatientFile:
+    """An output that keeps what the disk does not take, and offers it again at the next drain."""
+
+    def __init__(self, path: Path) -> None:
+        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        fcntl.flock(self._fd, fcntl.LOCK_EX)
+        self._pending = bytearray()
+        self._size = 0
+
+    def write(self, data: bytes) -> int:
+        """Take data; nothing is written before :meth:`drain`."""
+        self._pending += data
+        self._size += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        """Size of the file once everything is written."""
+        return self._size
+
+    @property
+    def pending_bytes(self) -> int:
+        """What the disk has not taken yet."""
+        return len(self._pending)
+
+    def flush(self) -> None:
+        """Do nothing: :meth:`drain` decides when, and reports failure."""
+
+    def drain(self) -> None:
+        """Write everything pending; raises OSError, and keeps the rest, if the disk refuses."""
+        while self._pending:
+            written = os.write(self._fd, self._pending)
+            del self._pending[:written]
+
+    def close(self) -> None:
+        """Close and release the lock; what is still pending is lost. Safe to call twice."""
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
+
+
+class Part:
+    """Writes messages of our topics to one MCAP file, channels registered as they come."""
+
+    def __init__(self, path: Path, arm_name: str) -> None:
+        self.path = path
+        self._arm_name = arm_name
+        self._file = PatientFile(path)
+        self._writer = Writer(
+            self._file,  # type: ignore[arg-type]  # anything with write, tell and flush serves
+            chunk_size=_CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+        )
+        self._writer.start(profile="", library="pneuarm")
+        self._channels: dict[str, int] = {}
+
+    def write(self, topic: Topic, payload: bytes, time_unix_ns: int, sequence: int = 0) -> None:
+        """Add one serialised message."""
+        channel = self._channels.get(topic.key)
+        if channel is None:
+            channel = self._register(topic)
+        self._writer.add_message(channel, time_unix_ns, payload, time_unix_ns, sequence)
+
+    def _register(self, topic: Topic) -> int:
+        message_type: type[Message] | None = topic.message
+        if message_type is None:
+            raise ValueError(f"{topic.key} has no message type and cannot be logged")
+        schema = register_schema(self._writer, message_type)
+        channel: int = self._writer.register_channel(
+            full_key(self._arm_name, topic.key), MessageEncoding.Protobuf, schema
+        )
+        self._channels[topic.key] = channel
+        return channel
+
+    def add_metadata(self, name: str, data: dict[str, str]) -> None:
+        """Add a metadata record."""
+        self._writer.add_metadata(name, data)
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of the file, without the chunk in progress."""
+        return self._file.tell()
+
+    @property
+    def pending_bytes(self) -> int:
+        """What waits in memory for the disk."""
+        return self._file.pending_bytes
+
+    def flush(self) -> None:
+        """Close the chunk in progress and put everything on the disk; raises OSError."""
+        self._writer.flush()
+        self._file.drain()
+
+    def finish(self) -> None:
+        """Write index and footer and close; raises OSError, and may be tried again."""
+        if not self._finished:
+            self._writer.finish()
+            self._finished = True
+        self._file.drain()
+        self._file.close()
+
+    _finished = False

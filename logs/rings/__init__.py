@@ -1,0 +1,1 @@
+"""Shared memory between the processes: the tick records, the messages, the status."""

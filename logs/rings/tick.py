@@ -1,0 +1,84 @@
+"""The record of one tick: an ArmState as a fixed-size numpy record, and both ways between them.
+
+`schema/pneuarm.proto` is the only definition. A repeated field of ArmState becomes an array whose
+size follows from its name: a position, velocity or offset has 3 elements, an orientation
+4, all others one a chamber.
+An unknown array is NaN in the record and empty in the message.
+"""
+
+from functools import cache
+from math import isnan
+from typing import Any
+
+import numpy as np
+from google.protobuf.descriptor import FieldDescriptor
+
+from pneuarm.logs.schema.pneuarm_pb2 import ArmState
+
+_TYPES = {
+    FieldDescriptor.TYPE_UINT64: "<u8",
+    FieldDescriptor.TYPE_SFIXED64: "<i8",
+    FieldDescriptor.TYPE_UINT32: "<u4",
+    FieldDescriptor.TYPE_ENUM: "<u4",
+    FieldDescriptor.TYPE_DOUBLE: "<f8",
+}
+
+
+#: Endings of the names of vectors of the tip.
+_VECTORS = ("position_m", "velocity_m_s", "offset_m")
+
+
+def _size(field: Any, n_sections: int) -> tuple[int, ...]:
+    if not field.is_repeated:
+        return ()
+    if field.name.endswith(_VECTORS):
+        return (3,)
+    if field.name.endswith("orientation_xyzw"):
+        return (4,)
+    return (n_sections, 3)
+
+
+@cache
+def tick_dtype(n_sections: int) -> np.dtype[np.void]:
+    """Record type of a tick of an arm with ``n_sections`` sections."""
+    fields = [
+        (field.name, _TYPES[field.type], _size(field, n_sections))
+        for field in ArmState.DESCRIPTOR.fields
+    ]
+    return np.dtype(fields)
+
+
+def new_tick(n_sections: int) -> np.ndarray:
+    """One tick, shape (), with every array unknown."""
+    tick = np.zeros((), dtype=tick_dtype(n_sections))
+    for name in _ARRAYS:
+        tick[name] = np.nan
+    tick["n_sections"] = n_sections
+    return tick
+
+
+_ARRAYS = tuple(field.name for field in ArmState.DESCRIPTOR.fields if field.is_repeated)
+_SCALARS = tuple(field.name for field in ArmState.DESCRIPTOR.fields if not field.is_repeated)
+
+
+def state_from_tick(tick: np.void | np.ndarray) -> ArmState:
+    """Message of a tick."""
+    state = ArmState(**{name: tick[name].item() for name in _SCALARS})
+    for name in _ARRAYS:
+        values = tick[name].reshape(-1).tolist()
+        if not all(map(isnan, values)):  # a part may be unknown: a chamber without a sensor
+            getattr(state, name).extend(values)
+    return state
+
+
+def ticks_from_states(states: list[ArmState], n_sections: int) -> np.ndarray:
+    """Ticks, shape (len(states),), of messages of one arm."""
+    ticks = np.zeros(len(states), dtype=tick_dtype(n_sections))
+    for name in _SCALARS:
+        ticks[name] = [getattr(state, name) for state in states]
+    for name in _ARRAYS:
+        shape = ticks.dtype[name].shape
+        unknown = [np.nan] * int(np.prod(shape))
+        rows = [list(getattr(state, name)) or unknown for state in states]
+        ticks[name] = np.array(rows, dtype=np.float64).reshape(len(states), *shape)
+    return ticks

@@ -1,0 +1,1 @@
+"""What Rerun shows: one function for live and for replay."""

@@ -1,0 +1,90 @@
+"""`pneuarm calibrate`: move, record, fit, write."""
+
+import argparse
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
+from pneuarm.controllers.calibration.plan import duration_s, plan
+from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.service.calibration.drive import progress, record, require_tip
+from pneuarm.service.calibration.files import calibrated, require_folder, toml_text, write_whole
+from pneuarm.service.calibration.page import page
+from pneuarm.service.calibration.recordings import read_logs, require_seen
+from pneuarm.service.calibration.values import errors_mm, residuals_text, value_text, values
+from pneuarm.service.client.client import Client
+from pneuarm.service.configuration.configuration import Configuration, check
+
+_TOML, _PAGE = "calibration.toml", "calibration.html"
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Calibrate from a running daemon, or from logs; write the configuration and the page."""
+    folder: Path = arguments.out
+    require_folder(folder)
+    configuration, recording = (
+        read_logs(arguments.from_logs, arguments.arm) if arguments.from_logs else _live(arguments)
+    )
+    print("fitting ...", file=sys.stderr, flush=True)
+    found = calibrate(configuration.build_arm(), recording, arguments.world)
+    text = toml_text(configuration, found)
+    write_whole(folder / _PAGE, page(found))
+    write_whole(folder / _TOML, text)
+    _tell(arguments, found, folder)
+    if found.fit.in_world and not arguments.json:
+        frame = calibrated(configuration, found).frames.mocap_frame
+        print(f"with it, tip poses must come in under the frame {frame!r}: see its [frames]")
+    return 0
+
+
+def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
+    name = arguments.arm or "paper"
+    with Client(name, arguments.connect, "calibrate", arguments.zenoh_config) as client:
+        configuration = check(tomllib.loads(client.info().config_toml), "the daemon")
+        arm = configuration.build_arm()
+        moves = plan(arm)
+        require_tip(client)
+        print(
+            f"arm {name} moves through {len(moves)} places in {duration_s(moves):.0f} s; keep its "
+            "workspace free; Ctrl-C ends it with the arm vented",
+            file=sys.stderr,
+            flush=True,
+        )
+        recording = record(client, moves, arm.n_sections, progress())
+    require_seen(recording)
+    return configuration, recording
+
+
+def _tell(arguments: argparse.Namespace, found: Calibration, folder: Path) -> None:
+    if arguments.json:
+        print(json.dumps(report(found, folder)))
+        return
+    print(f"{residuals_text(found)}.")
+    for value in values(found):
+        print(f"  {value_text(value)}")
+    if found.note:
+        print(found.note)
+    print(f"wrote {folder / _TOML} (use it: pneuarm run {folder / _TOML}) and {folder / _PAGE}")
+
+
+def report(found: Calibration, folder: Path) -> dict[str, Any]:
+    """Everything for programs: residuals, parameters, frames, files."""
+    before, after = errors_mm(found)
+    frames = found.fit.frames
+    return {
+        "arm": found.arm.name,
+        "rests": len(after),
+        "error_before_mm": {"mean": before.mean(), "max": before.max()},
+        "error_after_mm": {"mean": after.mean(), "max": after.max()},
+        "parameters": [vars(value) for value in values(found)],
+        "coupling": [section.coupling for section in found.arm.sections],
+        "rotation_base_to_measuring": frames.rotation.tolist(),
+        "base_in_measuring_mm": (1e3 * frames.translation_m).tolist(),
+        "marker_in_tip_mm": (1e3 * frames.marker_m).tolist(),
+        "note": found.note,
+        "configuration": str(folder / _TOML),
+        "page": str(folder / _PAGE),
+    }

@@ -1,0 +1,305 @@
+"""The command line. Units at the prompt are millimetres, degrees and bar."""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from pneuarm.controllers.arm.errors import PneuarmError
+
+Command = Callable[[argparse.Namespace], int]
+Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+PRESETS = ("paper", "table1", "trunk")
+
+#: Devices that `emulate` knows; the modules are in service/emulators/command.py.
+EMULATED = ("festo-cpx", "festo-vtem", "ctrl-p", "esp32")
+_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def _call(where: str, arguments: argparse.Namespace) -> int:
+    """Call "module:function"; loaded only now, so that no command waits for the others' imports."""
+    module, _, name = where.partition(":")
+    function: Command = getattr(importlib.import_module(module), name)
+    return function(arguments)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    parser = argparse.ArgumentParser(
+        prog="pneuarm", description="Real-time control service for soft pneumatic arms."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_daemon(commands)
+    _add_emulate(commands)
+    _add_client(commands)
+    _add_logs(commands)
+    _add_validate(commands)
+    _add_workspace(commands)
+    _add_machine(commands)
+    _add_calibrate(commands)
+    return parser
+
+
+def _command(
+    commands: Subparsers, name: str, where: str, help_text: str
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(name, help=help_text, description=help_text)
+    parser.set_defaults(where=where)
+    return parser
+
+
+def _add_daemon(commands: Subparsers) -> None:
+    run = _command(
+        commands,
+        "run",
+        "pneuarm.service.cli.daemon_commands:run",
+        "Run the daemon until Ctrl-C; it ends with vented arm.",
+    )
+    config = _command(
+        commands,
+        "config",
+        "pneuarm.service.cli.daemon_commands:config",
+        "Show the effective configuration, or check.",
+    )
+    config.add_argument("action", choices=("show", "check"))
+    for parser in (run, config):
+        parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
+        parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
+    run.add_argument("--viewer", action="store_true", help="open Rerun's window, with a display")
+    demo = _command(
+        commands,
+        "demo",
+        "pneuarm.service.demo.demo:demo",
+        "Daemon and client as processes: circle, eight, ...",
+    )
+    demo.add_argument("--seconds", type=float, default=30.0, help="length of the show (default 30)")
+    demo.add_argument("--adapter", choices=("simulator", *EMULATED), default="simulator")
+    demo.add_argument("--arm", choices=PRESETS, default="paper")
+    demo.add_argument("--seed", type=int, default=0, help="seed of the simulated arm")
+    demo.add_argument("--json", action="store_true", help="one JSON object instead of the table")
+
+
+def _add_emulate(commands: Subparsers) -> None:
+    help_text = "A device without the device, for tests."
+    emulate = commands.add_parser("emulate", help=help_text, description=help_text)
+    devices = emulate.add_subparsers(dest="what", required=True, metavar="DEVICE")
+    for name in EMULATED:
+        _add_emulated_device(devices, name)
+    _add_emulated_camera(devices)
+
+
+def _add_emulated_device(devices: Subparsers, name: str) -> None:
+    device = _command(
+        devices,
+        name,
+        "pneuarm.service.emulators.command:emulate",
+        f"{name}, with the simulated arm behind it.",
+    )
+    device.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
+    device.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
+    device.add_argument("--record", type=Path, metavar="FILE", help="what reaches it, JSON lines")
+    if not name.startswith("festo"):
+        return
+    device.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
+    device.add_argument("--watchdog-ms", type=int, help="its own watchdog at power-on")
+    device.add_argument("--fail-safe", choices=("reset", "hold"), default="reset")
+
+
+def _add_emulated_camera(devices: Subparsers) -> None:
+    help_text = "Motion capture that sees the tip of a simulated arm."
+    camera = _command(
+        devices, "camera", "pneuarm.service.emulators.camera:emulate_camera", help_text
+    )
+    camera.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
+    camera.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
+    camera.add_argument("--rate", type=float, default=100.0, help="poses a second (100)")
+    camera.add_argument("--delay-ms", type=float, default=10.0, help="age of a pose (10)")
+    camera.add_argument("--noise-mm", type=float, default=0.1, help="on every axis (0.1)")
+    camera.add_argument("--seed", type=int, default=0, help="seed of the noise")
+    camera.add_argument("--seconds", type=float, default=0.0, help="end after (0: Ctrl-C)")
+
+
+def _add_client(commands: Subparsers) -> None:
+    send = _command(
+        commands,
+        "send",
+        "pneuarm.service.cli.client_commands:send",
+        "Send a target until it is reached; then the arm holds.",
+    )
+    kinds = send.add_subparsers(dest="kind", required=True, metavar="KIND")
+    position = kinds.add_parser("position", help="tip position in the base frame, mm")
+    pose = kinds.add_parser("pose", help="tip position, mm, and quaternion x y z w")
+    direction = kinds.add_parser("direction", help="where the tip points, in the base frame")
+    point = kinds.add_parser("point", help="a point of the backbone at a position, mm")
+    twist = kinds.add_parser("twist", help="tip velocity, mm/s, for some seconds")
+    # One name for all values: where some are missing, argparse cannot tell a tuple of names.
+    for parser, count, names in (
+        (position, 3, "X Y Z, mm"),
+        (pose, 7, "X Y Z, mm, QX QY QZ QW"),
+        (direction, 3, "DX DY DZ"),
+        (point, 3, "X Y Z, mm"),
+        (twist, 3, "VX VY VZ, mm/s"),
+    ):
+        parser.add_argument("values", nargs=count, type=float, metavar="VALUE", help=names)
+    point.add_argument("--station", type=float, required=True, help="0 the base, 1 the tip")
+    twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")
+    twist.add_argument("--frame", choices=("base", "tip"), default="base")
+    twist.add_argument("--point", choices=("tip", "base"), default="tip", help="reference point")
+    twist.add_argument("--seconds", type=float, default=1.0)
+    lengths = kinds.add_parser("lengths", help="chamber lengths, three a section, mm")
+    pressures = kinds.add_parser("pressures", help="gauge pressures, three a section, bar")
+    for parser in (lengths, pressures):
+        parser.add_argument("values", nargs="+", type=float, metavar="VALUE")
+    shapes = _add_shapes(kinds)
+    for parser in (position, pose, direction, point, twist, lengths, pressures, *shapes):
+        _add_connection(parser)
+        parser.add_argument("--enable", action="store_true", help="arm first")
+        parser.add_argument("--take-over", action="store_true", help="take the lease from another")
+        parser.add_argument("--law", choices=("resolved_rate", "qp_ik"))
+        parser.add_argument("--timeout", type=float, default=10.0, help="give up after (s)")
+    helps = {
+        "enable": "Take the lease and arm; the next `send` goes on from there.",
+        "hold": "Keep the last pressures.",
+        "vent": "Let the air out, to idle.",
+        "reset": "Leave fault or estop, to idle.",
+    }
+    for name, text in helps.items():
+        parser = _command(commands, name, "pneuarm.service.cli.client_commands:mode", text)
+        _add_connection(parser)
+        if name == "enable":
+            parser.add_argument("--take-over", action="store_true")
+    _add_connection(
+        _command(
+            commands,
+            "estop",
+            "pneuarm.service.cli.client_commands:estop",
+            "Stop: vent at once, and latch.",
+        )
+    )
+    state = _command(
+        commands, "state", "pneuarm.service.cli.client_commands:state", "Show the newest state."
+    )
+    state.add_argument("--follow", action="store_true", help="go on until Ctrl-C")
+    _add_connection(state)
+
+
+def _add_shapes(kinds: Subparsers) -> list[argparse.ArgumentParser]:
+    circle = kinds.add_parser("circle", help="tip on a circle: center and radius, mm")
+    circle.add_argument("values", nargs=4, type=float, metavar="VALUE", help="X Y Z RADIUS, mm")
+    circle.add_argument("--frequency", type=float, default=0.25, help="turns a second (0.25)")
+    circle.add_argument("--turns", type=float, default=1.0)
+    circle.add_argument("--normal", nargs=3, type=float, default=(0.0, 0.0, 1.0), metavar="N")
+    line = kinds.add_parser("line", help="tip from one point to another and back, mm")
+    line.add_argument("values", nargs=6, type=float, metavar="VALUE", help="X Y Z X Y Z, mm")
+    line.add_argument("--period", type=float, default=4.0, help="s, there and back (4)")
+    line.add_argument("--repeats", type=float, default=1.0)
+    trajectory = kinds.add_parser("trajectory", help="tip through timed waypoints of a file")
+    trajectory.add_argument("file", type=Path, help="lines of: time in s, then x y z in mm")
+    return [circle, line, trajectory]
+
+
+def _add_connection(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
+    parser.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
+    parser.add_argument("--zenoh-config", default="", help="Zenoh configuration, for TLS")
+    parser.add_argument("--json", action="store_true", help="JSON instead of text")
+
+
+def _add_logs(commands: Subparsers) -> None:
+    replay = _command(
+        commands,
+        "replay",
+        "pneuarm.service.replay.command:replay",
+        "Show a recorded session again.",
+    )
+    replay.add_argument("log", type=Path)
+    replay.add_argument("--speed", type=float, default=1.0)
+    replay.add_argument("--loop", action="store_true")
+    replay.add_argument("--to", choices=("rerun", "zenoh"), default="rerun")
+    replay.add_argument("--listen", default=_ENDPOINT, help="where to listen, with --to zenoh")
+    replay.add_argument("--port", type=int, default=9876, help="port of Rerun's server")
+    info = _command(
+        commands,
+        "info",
+        "pneuarm.service.replay.command:info",
+        "Say what is in a recorded session.",
+    )
+    info.add_argument("log", type=Path)
+    info.add_argument("--json", action="store_true")
+
+
+def _add_validate(commands: Subparsers) -> None:
+    help_text = "Compare the model with the paper's measurements."
+    validate = _command(
+        commands, "validate", "pneuarm.service.validation.command:validate", help_text
+    )
+    validate.add_argument("what", choices=("table1",))
+    validate.add_argument("--table", type=Path, metavar="FILE.csv", help="another such table")
+    validate.add_argument("--json", action="store_true", help="one JSON object instead")
+
+
+def _add_workspace(commands: Subparsers) -> None:
+    workspace = _command(
+        commands,
+        "workspace",
+        "pneuarm.service.workspace.command:workspace",
+        "Where the tip can be, and how well.",
+    )
+    workspace.add_argument("--arm", choices=PRESETS, default="paper")
+    workspace.add_argument("--out", type=Path, metavar="DIR", help="write picture, mesh, samples")
+    workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
+    workspace.add_argument("--seed", type=int, default=0, help="seed of the random points")
+    workspace.add_argument("--json", action="store_true", help="one JSON object instead of text")
+
+
+def _add_machine(commands: Subparsers) -> None:
+    doctor = _command(
+        commands,
+        "doctor",
+        "pneuarm.service.doctor.command:doctor",
+        "Is this PC ready, and what must be changed.",
+    )
+    doctor.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    systemd = _command(
+        commands,
+        "systemd",
+        "pneuarm.service.systemd.unit:systemd",
+        "Print a unit file: the daemon as a service.",
+    )
+    systemd.add_argument("--user", help="who runs it (default: you)")
+    for parser in (doctor, systemd):
+        parser.add_argument("config", nargs="?", type=Path, metavar="CONFIG.toml")
+        parser.add_argument("--arm", choices=PRESETS, help="a built-in arm (default: paper)")
+
+
+def _add_calibrate(commands: Subparsers) -> None:
+    help_text = "Move the arm, fit the map between pressure and length, write a configuration."
+    calibrate = _command(
+        commands, "calibrate", "pneuarm.service.calibration.command:run", help_text
+    )
+    _add_connection(calibrate)
+    calibrate.set_defaults(arm=None)  # a log says by itself whose it is
+    calibrate.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="(default: .)")
+    calibrate.add_argument(
+        "--from", dest="from_logs", nargs="+", type=Path, metavar="LOG", help="recorded sessions"
+    )
+    calibrate.add_argument(
+        "--world", action="store_true", help="poses are of a marker, in a frame not the base's"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; an error is one sentence on stderr and the exit status 1."""
+    parsed = build_parser().parse_args(arguments)
+    try:
+        return _call(parsed.where, parsed)
+    except PneuarmError as error:
+        print(f"pneuarm: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        return 0

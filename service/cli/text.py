@@ -1,0 +1,56 @@
+"""States for people: millimetres, degrees and bar."""
+
+import math
+
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+
+_LIMITS = ((1, "length, Eq. (4)"), (2, "bend"), (4, "pressure"), (8, "keep-out"))
+
+
+def millimetres(values_m: "list[float] | object") -> str:
+    """Format metres as millimetres."""
+    return "(" + ", ".join(f"{1e3 * value:.1f}" for value in values_m) + ")"  # type: ignore
+
+
+def bars(values_pa: "list[float] | object") -> str:
+    """Format pascal as bar."""
+    return "(" + ", ".join(f"{1e-5 * value:+.3f}" for value in values_pa) + ")"  # type: ignore
+
+
+def binding(flags: int) -> str:
+    """Names of the limits that bind."""
+    return " and ".join(name for bit, name in _LIMITS if flags & bit) or "no limit"
+
+
+def state_line(state: pb.ArmState) -> str:
+    """One line: number, mode, tip, target, lengths, pressures."""
+    parts = [
+        f"#{state.sequence}",
+        pb.Mode.Name(state.mode).lower(),
+        f"tip {millimetres(state.tip_estimated_position_m)} mm",
+    ]
+    if state.target_kind != pb.NO_TARGET:
+        kind = pb.TargetKind.Name(state.target_kind).lower()
+        reach = pb.Reach.Name(state.reach).lower().replace("_", " ")
+        goal = f" {millimetres(state.target_position_m)} mm" if state.target_position_m else ""
+        parts.append(f"{kind}{goal} {reach}, error {1e3 * state.target_error_m:.2f} mm")
+    parts.append(f"lengths {millimetres(state.length_estimated_m)} mm")
+    parts.append(f"pressures {bars(state.pressure_measured_pa)} bar")
+    return "  ".join(parts)
+
+
+def outcome(state: pb.ArmState) -> str:
+    """Say how a target ended: reached, or out of reach and why, and how near."""
+    tip = millimetres(state.tip_estimated_position_m)
+    error = 1e3 * state.target_error_m
+    if state.reach == pb.REACHED:
+        return f"reached: tip at {tip} mm (estimated), commanded error {error:.2f} mm"
+    return (
+        f"out of reach: {binding(state.binding_limits)} binds; the nearest the arm came is "
+        f"{millimetres(state.tip_commanded_position_m)} mm, {error:.1f} mm away"
+    )
+
+
+def radians(values_deg: list[float] | None) -> list[float] | None:
+    """Convert degrees."""
+    return None if values_deg is None else [math.radians(value) for value in values_deg]

@@ -1,0 +1,1 @@
+"""The user's own program: the client and the targets it sends."""

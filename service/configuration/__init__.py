@@ -1,0 +1,1 @@
+"""TOML to a checked, frozen configuration, and the built-in arms."""

@@ -1,0 +1,178 @@
+"""TOML -> checked, frozen configuration.
+
+A file is laid over one of the built-in arms (`preset`, "paper" unless it says otherwise), so it
+holds only what differs. People read and write millimetres, degrees and bar here; everything
+behind this module is SI. A wrong key or value is refused before any device is touched. The tables
+themselves are in :mod:`pneuarm.service.configuration.tables`.
+"""
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import tomli_w
+from platformdirs import user_state_path
+from pydantic import BaseModel, ValidationError, model_validator
+
+from pneuarm.controllers.arm.arm import Arm, uncalibrated
+from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
+from pneuarm.controllers.limits.consistency import refuse_contradictions
+from pneuarm.service.configuration.tables.arm import ArmConfig
+from pneuarm.service.configuration.tables.control import ControlConfig
+from pneuarm.service.configuration.tables.feedback import FeedbackConfig, ReferenceConfig
+from pneuarm.service.configuration.tables.festo import FestoCpxConfig, FestoVtemConfig
+from pneuarm.service.configuration.tables.frames import FramesConfig
+from pneuarm.service.configuration.tables.hardware import HardwareConfig, SimulatorConfig
+from pneuarm.service.configuration.tables.monitors import MonitorsConfig
+from pneuarm.service.configuration.tables.outputs import LogConfig, RerunConfig, ZenohConfig
+from pneuarm.service.configuration.tables.serial import CtrlPConfig, Esp32Config, ReplayConfig
+from pneuarm.service.configuration.tables.table import Table
+
+PRESETS = ("paper", "table1", "trunk")
+
+
+class Configuration(Table):
+    """Everything the daemon is told."""
+
+    preset: Literal["paper", "table1", "trunk"] = "paper"
+    arm: ArmConfig
+    control: ControlConfig = ControlConfig()
+    reference: ReferenceConfig = ReferenceConfig()
+    feedback: FeedbackConfig = FeedbackConfig()
+    frames: FramesConfig = FramesConfig()
+    hardware: HardwareConfig = HardwareConfig()
+    monitors: MonitorsConfig = MonitorsConfig()
+    simulator: SimulatorConfig = SimulatorConfig()
+    festo_cpx: FestoCpxConfig = FestoCpxConfig()
+    festo_vtem: FestoVtemConfig = FestoVtemConfig()
+    ctrl_p: CtrlPConfig = CtrlPConfig()
+    esp32: Esp32Config = Esp32Config()
+    replay: ReplayConfig = ReplayConfig()
+    zenoh: ZenohConfig = ZenohConfig()
+    rerun: RerunConfig = RerunConfig()
+    log: LogConfig = LogConfig()
+
+    @model_validator(mode="after")
+    def _simulated_as_controlled(self) -> "Configuration":
+        there, here = len((self.simulator.arm or self.arm).sections), len(self.arm.sections)
+        if there != here:
+            raise ValueError(
+                f"simulator.arm has {there} sections, arm has {here}; the numbers must be equal"
+            )
+        return self
+
+    def build_arm(self) -> Arm:
+        """Return the arm that the controller believes in, in SI units."""
+        return replace(self.arm.build(), tool_m=self.frames.tool_m())
+
+    def build_simulated_arm(self) -> Arm:
+        """Return the arm that the simulator makes real: ``arm`` where nothing else is said.
+
+        Its body has weight, stiffness and hysteresis of its own: those of a calibration are left
+        out.
+        """
+        arm = (self.simulator.arm or self.arm).build()
+        return replace(arm, sections=tuple(uncalibrated(section) for section in arm.sections))
+
+    @property
+    def device_address(self) -> str:
+        """What the lock is on: one daemon a device, whatever the arm is called."""
+        return f"{self.hardware.adapter}:{self.hardware.device or self.arm.name}"
+
+    def to_toml(self) -> str:
+        """Return the effective configuration as a file that gives it again."""
+        return tomli_w.dumps(self.model_dump(mode="python", exclude_none=True))
+
+
+def log_directory(configuration: Configuration) -> Path:
+    """Return the directory of the sessions: the configured one, or in the user's state."""
+    named = configuration.log.directory
+    default = user_state_path("pneuarm") / "sessions"
+    return Path(named).expanduser() if named else default
+
+
+def rerun_url(configuration: Configuration) -> str:
+    """Address under which a Rerun viewer finds the live view."""
+    bind = configuration.rerun.bind
+    host = "127.0.0.1" if bind in ("0.0.0.0", "::") else bind
+    return f"rerun+http://{host}:{configuration.rerun.port}/proxy"
+
+
+def load(path: Path | None = None, preset: str | None = None) -> Configuration:
+    """Read a file over a built-in arm; raises ConfigurationError with one sentence a mistake."""
+    where = str(path) if path else "configuration"
+    own = {} if path is None else _read(path)
+    name = preset or own.get("preset", "paper")
+    if name not in PRESETS:
+        raise ConfigurationError(f"{where}: preset = {name!r}; allowed: {', '.join(PRESETS)}")
+    text = files("pneuarm.service.configuration").joinpath("presets", f"{name}.toml").read_text()
+    return check(_laid_over(tomllib.loads(text), own | {"preset": name}), where)
+
+
+def check(tables: dict[str, Any], where: str = "configuration") -> Configuration:
+    """Check tables as a file has them; raises ConfigurationError."""
+    try:
+        configuration = Configuration.model_validate(tables)
+        refuse_contradictions(configuration.build_arm())
+    except ValidationError as error:
+        items = error.errors()
+        if len(items) > 1:  # a list counts as short because its elements were refused: no news
+            items = [item for item in items if item["type"] != "too_short"]
+        lines = [f"{where}: {_sentence(item)}" for item in items]
+        raise ConfigurationError("\n".join(lines)) from error
+    except InvalidInput as error:
+        raise ConfigurationError(f"{where}: arm: {error}") from error
+    return configuration
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text())
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ConfigurationError(f"{path} is not TOML: {error}") from error
+
+
+def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Merge tables key by key; anything that is no table, lists too, is replaced whole."""
+    merged = dict(below)
+    for key, value in above.items():
+        old = merged.get(key)
+        both = isinstance(old, dict) and isinstance(value, dict)
+        merged[key] = _laid_over(old, value) if both and isinstance(old, dict) else value
+    return merged
+
+
+def _sentence(item: Any) -> str:
+    """One mistake as key, value and what is allowed."""
+    steps = [f"[{step}]" if isinstance(step, int) else f".{step}" for step in item["loc"]]
+    key = "".join(steps).lstrip(".") or "file"
+    if item["type"] == "extra_forbidden":
+        return f"{key}: no such key; allowed here: {', '.join(_keys_beside(item['loc']))}"
+    if item["type"] == "missing":
+        return f"{key} is missing"
+    message = item["msg"].removeprefix("Value error, ")
+    if item["type"] == "value_error":
+        return f"{key}: {message}"
+    return f"{key} = {item['input']!r}: {message[0].lower()}{message[1:]}"
+
+
+def _keys_beside(location: tuple[int | str, ...]) -> list[str]:
+    """Return the keys that stand where an unknown one was found."""
+    model: type[BaseModel] = Configuration
+    for step in location[:-1]:
+        if isinstance(step, str) and step in model.model_fields:
+            model = next(_models_in(model.model_fields[step].annotation), model)
+    return list(model.model_fields)
+
+
+def _models_in(annotation: object) -> Iterator[type[BaseModel]]:
+    """Find the tables that an annotation names: itself, or those in a list of them."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _models_in(argument)

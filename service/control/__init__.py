@@ -1,0 +1,1 @@
+"""The control process: the tick, its deadlines, its steering."""

@@ -1,0 +1,1 @@
+"""Who starts and watches whom: supervisor, recorder, viewer, repair, the stop past the network."""

@@ -1,0 +1,1 @@
+"""`pneuarm demo`: the daemon, a client, and the table at the end."""

@@ -1,0 +1,173 @@
+"""The device process: the guard and a blocking transport, away from the loop.
+
+It moves the arm only while control's commands are fresh. When they are not it sends zeros and then
+nothing at all, so that the device's own watchdog runs out if this was not enough.
+"""
+
+import socket
+import time
+from multiprocessing.connection import Connection
+
+from pneuarm.controllers.arm.errors import HardwareError
+from pneuarm.hardware.guard import Guard
+from pneuarm.hardware.guarded import GuardedDevice
+from pneuarm.service.configuration.configuration import Configuration
+from pneuarm.service.devices import registry as backends
+from pneuarm.service.processes import realtime
+from pneuarm.service.processes.device_slots import (
+    DeviceCommand,
+    DeviceEnd,
+    DeviceLink,
+    LinkState,
+    Order,
+)
+from pneuarm.service.processes.shared import Shared, ignore_terminal_signals, parent_is_alive
+
+#: Control's first commands, while it warms up, come in no order of time: until this many have come
+#: nothing but zeros was ever asked for, and this process keeps the device content by itself.
+WARM_UP_COMMANDS = 10
+
+_RETRY_S = 0.3
+_IDLE_S = 0.005
+_VENT_BEFORE_END_S = 3.0
+
+
+class DeviceProcess:
+    """Serves one device until the order to end, or until its parent is gone."""
+
+    def __init__(self, configuration: Configuration, link: DeviceLink, end: Connection) -> None:
+        arm = configuration.build_arm()
+        period_s = 1.0 / configuration.control.rate_hz
+        guard = Guard(arm, period_s, configuration.hardware.supply_flow_limit_pa_s)
+        self._device = GuardedDevice(backends.build(configuration, arm), guard, arm.n_sections)
+        self._link = DeviceEnd(link)
+        self._max_age_s = max(Guard.MAX_AGE_PERIODS * period_s, Guard.MAX_AGE_S)
+        self._period_s = 1.0 / min(
+            configuration.hardware.exchange_rate_hz, configuration.control.rate_hz
+        )
+        self._end = end
+        self._connected = self._may_regulate = self._silent = False
+        self._retry_s = 0.0
+        self._parent_gone_s: float | None = None
+
+    def run(self) -> None:
+        """Serve; leave the device vented and closed, whatever happens in between."""
+        due_s = time.monotonic()
+        try:
+            while not self._is_over():
+                self.step()
+                due_s = max(due_s + self._period_s, time.monotonic())
+                time.sleep(max(0.0, due_s - time.monotonic()))
+        finally:
+            self._let_go()
+
+    def step(self) -> None:
+        """One exchange with the device, or what stands in its place."""
+        command = self._link.command()
+        if self._is_fresh(command):
+            self._silent = False
+        elif not self._silent:
+            self._fall_silent(command)
+        if self._silent:
+            return
+        if not self._connected:
+            self._connect()
+        else:
+            self._exchange(command)
+
+    def _is_fresh(self, command: DeviceCommand | None) -> bool:
+        """Whether control is alive by its commands; it need not be before it has begun."""
+        if command is None or command.sequence <= WARM_UP_COMMANDS:
+            return True
+        return time.monotonic() - command.commanded_at_s <= self._max_age_s
+
+    def _fall_silent(self, command: DeviceCommand | None) -> None:
+        """Send zeros once more, then nothing: the device's watchdog has the last word."""
+        self._silent = True
+        text = f"no command for {self._max_age_s * 1e3:.0f} ms: the loop stood still; zeros sent"
+        if self._connected:
+            self._connected = False
+            try:
+                self._device.vent(time.monotonic())
+            except HardwareError as error:
+                text += f", which failed: {error}"
+        self._link.say(LinkState.SILENT, time.monotonic(), text)
+
+    def _connect(self) -> None:
+        """Connect, vented; it regulates only after a new order to vent: nothing re-arms itself."""
+        now_s = time.monotonic()
+        if now_s < self._retry_s:
+            time.sleep(_IDLE_S)
+            return
+        self._link.say(LinkState.STARTING, now_s)
+        self._may_regulate = False
+        try:
+            self._device.close()
+            self._device.connect()
+            self._device.vent(time.monotonic())
+            self._measure()
+        except HardwareError as error:
+            self._lose(error)
+            return
+        self._connected = True
+
+    def _exchange(self, command: DeviceCommand | None) -> None:
+        try:
+            self._write(command)
+            self._measure()
+        except HardwareError as error:
+            self._lose(error)
+
+    def _write(self, command: DeviceCommand | None) -> None:
+        warm = command is not None and command.sequence > WARM_UP_COMMANDS
+        self._may_regulate |= warm and command is not None and command.order == Order.VENT
+        now_s = time.monotonic()
+        regulates = self._may_regulate and self._parent_gone_s is None
+        if command is None or not warm or not regulates or command.order == Order.VENT:
+            self._device.vent(now_s)
+        else:
+            guarded = self._device.write(command.pressures_pa, command.commanded_at_s, now_s)
+            self._device.acknowledged(time.monotonic())
+            self._link.intervened(guarded.intervention)
+        self._link.sent(self._device.sent_pa)
+
+    def _measure(self) -> None:
+        measurement = self._device.read(time.monotonic())
+        now_s = time.monotonic()
+        self._link.measured(measurement, now_s, now_s)
+
+    def _lose(self, error: HardwareError) -> None:
+        """Tell it, and try again: at once the first time, so that the outputs go to zero."""
+        self._retry_s = 0.0 if self._connected else time.monotonic() + _RETRY_S
+        self._connected = False
+        self._link.say(LinkState.LOST, time.monotonic(), str(error))
+
+    def _is_over(self) -> bool:
+        """The end: on the supervisor's word, or after it is gone and control has fallen silent."""
+        now_s = time.monotonic()
+        if parent_is_alive():
+            return self._end.poll()
+        if self._parent_gone_s is None:
+            self._parent_gone_s = now_s
+        return self._silent or now_s - self._parent_gone_s > _VENT_BEFORE_END_S
+
+    def _let_go(self) -> None:
+        """Vent and close; what fails here has failed before, and was told."""
+        try:
+            if self._connected:
+                self._device.vent(time.monotonic())
+        except HardwareError:
+            pass  # its watchdog has to do it
+        finally:
+            self._device.close()
+
+
+def main(
+    shared: Shared, arm_lock: socket.socket, device_lock: socket.socket, end: Connection
+) -> None:
+    """Entry point of the process; the locks are held here too, as in control."""
+    ignore_terminal_signals()
+    # Right below the loop: a command that waits for a processor gets old.
+    realtime.take_priority(max(1, shared.configuration.control.priority - 1))
+    if shared.device is not None:
+        DeviceProcess(shared.configuration, shared.device, end).run()

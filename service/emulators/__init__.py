@@ -1,0 +1,1 @@
+"""`pneuarm emulate`: devices on their real transport, and a camera."""

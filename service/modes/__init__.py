@@ -1,0 +1,1 @@
+"""The mode machine: its table, its timers, its events."""

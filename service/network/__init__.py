@@ -1,0 +1,1 @@
+"""Zenoh sessions as this project opens them: loopback, no scouting."""

@@ -1,0 +1,1 @@
+"""What every process has in common: pipes, slots, children, priority, usage."""

@@ -1,0 +1,1 @@
+"""What counts as a fault, and what follows."""

@@ -1,0 +1,69 @@
+"""What a monitor is, what it looks at, and how long something must last to count."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from pneuarm.service.modes.mode import Mode
+from pneuarm.service.safety.faults import FaultCode
+
+
+@dataclass(slots=True)  # made in every tick: freezing it would cost more than all of its use
+class Seen:
+    """One tick as the monitors see it: SI units, chambers in lists row by row, NaN is unknown.
+
+    ``sent_pa`` is what the valves were told in the tick before, ``expected_pa`` what should have
+    come of it by now. ``tip_error_m`` is the distance of the measured tip from the estimated one.
+    """
+
+    now_s: float
+    dt_s: float
+    mode: Mode
+    vented: bool
+    measured_pa: list[float]
+    sent_pa: list[float]
+    expected_pa: list[float]
+    age_s: float
+    supply_pa: float
+    setpoints_pa: list[float] | None
+    lengths_m: list[float]
+    estimated_m: list[float]
+    tip_error_m: float
+    overruns: int
+    complaints: tuple[str, ...]
+    stop_pressed: bool
+
+
+class Monitor(Protocol):
+    """Looks for one fault."""
+
+    code: FaultCode
+
+    def look(self, seen: Seen) -> str:
+        """Return what is wrong in words, or an empty string. Called once a tick."""
+        ...
+
+
+class Lasting:
+    """Whether something has been so without a break for longer than a time."""
+
+    def __init__(self) -> None:
+        self._since_s: float | None = None
+
+    def longer(self, so: bool, now_s: float, than_s: float) -> bool:
+        """Take one look at ``now_s``."""
+        if not so:
+            self._since_s = None
+            return False
+        if self._since_s is None:
+            self._since_s = now_s
+        return now_s - self._since_s > than_s
+
+
+def chamber(index: int) -> str:
+    """Name of a chamber for people: sections from the base on, both counted from 1."""
+    return f"section {index // 3 + 1}, chamber {index % 3 + 1}"
+
+
+def bar(pressure_pa: float) -> str:
+    """Format a pressure for people."""
+    return f"{pressure_pa * 1e-5:.3f} bar"

@@ -1,0 +1,1 @@
+"""The gateway process: what comes in over Zenoh, what goes out, what is refused."""

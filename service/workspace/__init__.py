@@ -1,0 +1,1 @@
+"""`pneuarm workspace`: the workspace as files, pictures and a scene."""

@@ -1,4 +1,0 @@
-"""The fault campaign: a running daemon, faults at random moments, and what must hold all the same.
-
-`python -m tests.faults`, or `make faults`. The table it prints is the one of docs/safety.md.
-"""

@@ -1,0 +1,208 @@
+"""The command line: every command parses, bad numbers end with the usage, an error is one line."""
+
+import argparse
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from pneuarm.controllers.arm.errors import LeaseRefused
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.cli.client_commands import target_of
+from pneuarm.service.cli.parser import build_parser, main
+from pneuarm.service.configuration.configuration import load
+from tests.logs.recording.recording import make_session
+
+CONNECTION = ["--arm", "trunk", "--connect", "tcp/127.0.0.1:9", "--zenoh-config", "z", "--json"]
+POSE = ["1", "2", "3", "0", "0", "0", "1"]
+
+COMMANDS = [
+    ("cli.daemon_commands.run", ["run"]),
+    ("cli.daemon_commands.run", ["run", "own.toml", "--viewer"]),
+    ("cli.daemon_commands.run", ["run", "--arm", "trunk"]),
+    ("demo.demo.demo", ["demo"]),
+    (
+        "demo.demo.demo",
+        ["demo", "--seconds", "3", "--arm", "table1", "--seed", "4", "--json"],
+    ),
+    ("cli.client_commands.send", ["send", "position", "-40", "0.5", "-.5"]),
+    (
+        "cli.client_commands.send",
+        ["send", "position", "40", "0", "200", "--enable", "--take-over", *CONNECTION],
+    ),
+    (
+        "cli.client_commands.send",
+        ["send", "position", "4", "0", "2", "--law", "resolved_rate", "--timeout", "3"],
+    ),
+    ("cli.client_commands.send", ["send", "pose", *POSE]),
+    ("cli.client_commands.send", ["send", "twist", "1", "2", "3"]),
+    (
+        "cli.client_commands.send",
+        ["send", "twist", "1", "2", "-3", "--angular", "1", "2", "-3", "--frame", "tip"],
+    ),
+    (
+        "cli.client_commands.send",
+        ["send", "twist", "1", "2", "3", "--point", "base", "--seconds", "2"],
+    ),
+    ("cli.client_commands.send", ["send", "lengths", "200", "210", "190"]),
+    (
+        "cli.client_commands.send",
+        ["send", "pressures", "-0.5", "0", "0.5", "--enable"],
+    ),
+    ("cli.client_commands.mode", ["enable", "--take-over", *CONNECTION]),
+    ("cli.client_commands.mode", ["hold", *CONNECTION]),
+    ("cli.client_commands.mode", ["vent"]),
+    ("cli.client_commands.mode", ["reset"]),
+    ("cli.client_commands.estop", ["estop", *CONNECTION]),
+    ("cli.client_commands.state", ["state", "--follow", *CONNECTION]),
+    (
+        "replay.command.replay",
+        ["replay", "x.mcap", "--speed", "2", "--loop", "--to", "zenoh", "--port", "99"],
+    ),
+    ("replay.command.info", ["info", "x.mcap", "--json"]),
+    ("cli.daemon_commands.config", ["config", "show"]),
+    ("cli.daemon_commands.config", ["config", "check", "own.toml"]),
+    ("doctor.command.doctor", ["doctor"]),
+    ("doctor.command.doctor", ["doctor", "own.toml", "--json"]),
+    ("systemd.unit.systemd", ["systemd", "own.toml", "--user", "ada"]),
+    ("systemd.unit.systemd", ["systemd", "--arm", "trunk"]),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments"), COMMANDS, ids=lambda value: str(value)[:40])
+def test_every_command_parses_and_runs_its_function(
+    function: str, arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called: list[argparse.Namespace] = []
+
+    def run(parsed: argparse.Namespace) -> int:
+        called.append(parsed)
+        return 7
+
+    monkeypatch.setattr(f"pneuarm.service.{function}", run)
+    assert main(arguments) == 7
+    assert called[0].command == arguments[0]
+
+
+def test_what_was_not_said_has_its_default() -> None:
+    parsed = build_parser().parse_args(["send", "position", "1", "2", "3"])
+    assert (parsed.arm, parsed.connect) == ("paper", load().zenoh.listen[0])
+    assert (parsed.enable, parsed.take_over, parsed.law, parsed.timeout) == (False, False, None, 10)
+    replay = build_parser().parse_args(["replay", "x"])
+    assert (replay.speed, replay.loop, replay.to) == (1.0, False, "rerun")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "COMMAND"),
+        (["fly"], "invalid choice: 'fly'"),
+        (["send"], "KIND"),
+        (["send", "position", "a", "b", "c"], "argument VALUE: invalid float value: 'a'"),
+        (["send", "position", "1", "2"], "the following arguments are required: VALUE"),
+        (["send", "position", "1", "2", "3", "4"], "unrecognized arguments: 4"),
+        (["send", "pose", "1", "2", "3", "0", "0", "0"], "required"),
+        (["send", "lengths"], "VALUE"),
+        (["send", "lengths", "200", "two", "200"], "invalid float value: 'two'"),
+        (["send", "twist", "1", "2", "3", "--seconds", "soon"], "argument --seconds"),
+        (["send", "twist", "1", "2", "3", "--frame", "world"], "invalid choice: 'world'"),
+        (["emulate", "esp32", "--port", "5020"], "unrecognized arguments: --port"),
+        (["emulate", "ctrl-p", "--fail-safe", "hold"], "unrecognized arguments: --fail-safe"),
+        (["send", "position", "1", "2", "3", "--law", "pid"], "argument --law"),
+        (["run", "--arm", "octopus"], "invalid choice: 'octopus'"),
+        (["demo", "--seed", "1.5"], "invalid int value: '1.5'"),
+        (["replay", "x", "--speed", "fast"], "argument --speed"),
+        (["replay"], "required: log"),
+        (["config"], "action"),
+    ],
+)
+def test_a_command_that_is_wrong_ends_with_the_usage(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    said = capsys.readouterr().err
+    assert caught.value.code == 2
+    assert said.startswith("usage: pneuarm")
+    assert words in said
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"),
+    [
+        (LeaseRefused("bob holds the arm"), 1, "pneuarm: bob holds the arm\n"),
+        (KeyboardInterrupt(), 130, ""),
+        (BrokenPipeError(), 0, ""),
+    ],
+)
+def test_an_error_is_one_sentence_and_a_status(
+    error: BaseException,
+    status: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(parsed: argparse.Namespace) -> int:
+        raise error
+
+    monkeypatch.setattr("pneuarm.service.cli.client_commands.state", fail)
+    assert main(["state"]) == status
+    assert capsys.readouterr() == ("", said)
+
+
+def sent(*arguments: str) -> pb.Target:
+    return target_of(build_parser().parse_args(["send", *arguments]))
+
+
+def test_millimetres_degrees_and_bar_at_the_prompt_are_si_on_the_wire() -> None:
+    position = sent("position", "40", "-20", "200", "--law", "qp_ik")
+    vector = position.position.position_m
+    assert (vector.x, vector.y, vector.z) == pytest.approx((0.04, -0.02, 0.2))
+    assert (position.position.frame_id, position.law) == ("base", pb.QP_IK)
+    pose = sent("pose", "1", "2", "3", "0.5", "-0.5", "0.5", "0.5").pose
+    assert (pose.position_m.z, pose.orientation.y) == pytest.approx((0.003, -0.5))
+    twist = sent("twist", "10", "0", "0", "--angular", "0", "0", "180", "--frame", "tip").twist
+    assert twist.linear_m_s.x == pytest.approx(0.01)
+    assert twist.angular_rad_s.z == pytest.approx(math.pi)
+    assert (twist.frame_id, twist.reference_point) == ("tip", "tip")
+    assert not sent("twist", "10", "0", "0").twist.HasField("angular_rad_s")
+    assert sent("lengths", "200", "210", "190").lengths.length_m == pytest.approx([0.2, 0.21, 0.19])
+    assert sent("pressures", "-0.5", "0.5").pressures.pressure_pa == pytest.approx([-5e4, 5e4])
+
+
+def test_config_shows_what_loads_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["config", "show", "--arm", "trunk"]) == 0
+    path = tmp_path / "own.toml"
+    path.write_text(capsys.readouterr().out)
+    assert load(path) == load(preset="trunk")
+    assert main(["config", "check", str(path)]) == 0
+    assert capsys.readouterr().out.startswith(f"{path}: good; arm trunk, 9 chambers, 500 Hz")
+    path.write_text("[control]\nrate_hz = 1\n")
+    assert main(["config", "check", str(path)]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(f"pneuarm: {path}: control.rate_hz = 1: ")
+
+
+def test_info_tells_what_is_in_a_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session = make_session(tmp_path, monkeypatch)
+    session.write_ticks(30)
+    session.recorder().finish()
+    assert main(["info", str(session.path)]) == 0
+    text = capsys.readouterr().out
+    assert "(1 part, closed properly)" in text
+    assert "ticks     30, missing 0" in text
+    assert main(["info", str(session.path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["ticks"], told["missing_ticks"], told["arm"]) == (30, 0, "paper")
+    assert main(["info", str(tmp_path / "none.mcap")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("speed", ["0", "-1", "nan"])
+def test_a_log_is_not_replayed_at_no_speed(speed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", "x.mcap", "--speed", speed]) == 1
+    assert capsys.readouterr().err == f"pneuarm: --speed {speed}: it must be above 0\n"

@@ -1,0 +1,296 @@
+"""A wrong configuration is refused with key, value and what is allowed; a right one loads."""
+
+import contextlib
+import os
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pneuarm.controllers.arm.arm import HalfSpace, Sphere
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.laws.controller import Controller
+from pneuarm.service.cli.parser import PRESETS as CLI_PRESETS
+from pneuarm.service.configuration.configuration import (
+    PRESETS,
+    Configuration,
+    check,
+    load,
+    log_directory,
+    rerun_url,
+)
+
+SECTION = load().model_dump()["arm"]["sections"][0]
+
+
+def loaded(folder: Path, text: str) -> Configuration:
+    path = folder / "own.toml"
+    path.write_text(text)
+    return load(path)
+
+
+def refusals(folder: Path, text: str) -> list[str]:
+    """What is said of a file, a line a mistake, each beginning with the file's name."""
+    with pytest.raises(ConfigurationError) as caught:
+        loaded(folder, text)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(str(folder / "own.toml")) for line in lines)
+    return [line.removeprefix(f"{folder / 'own.toml'}").lstrip(": ") for line in lines]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_loads_and_builds_an_arm(preset: str) -> None:
+    configuration = load(preset=preset)
+    arm = configuration.build_arm()
+    assert (arm.name, configuration.preset) == (preset, preset)
+    lengths = Controller(arm, configuration.control.settings()).lengths_m
+    assert (lengths == arm.rest_lengths_m).all()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_what_is_shown_loads_to_the_same(tmp_path: Path, preset: str) -> None:
+    configuration = load(preset=preset)
+    assert loaded(tmp_path, configuration.to_toml()) == configuration
+
+
+def test_the_command_line_knows_the_same_presets() -> None:
+    assert CLI_PRESETS == PRESETS
+    presets = files("pneuarm.service.configuration").joinpath("presets").iterdir()
+    assert {path.name for path in presets} == {f"{name}.toml" for name in PRESETS}
+
+
+def test_a_file_holds_only_what_differs(tmp_path: Path) -> None:
+    own = loaded(tmp_path, 'preset = "table1"\n[control]\nrate_hz = 250\n[arm]\nname = "mine"\n')
+    expected = load(preset="table1")
+    assert (own.control.rate_hz, own.arm.name) == (250.0, "mine")
+    assert own.arm.sections == expected.arm.sections
+    assert own.control.model_copy(update={"rate_hz": 1000.0}) == expected.control
+
+
+def test_the_command_lines_arm_goes_before_the_files(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text('preset = "table1"\n')
+    assert load(tmp_path / "own.toml", "trunk").arm.name == "trunk"
+
+
+def test_millimetres_degrees_and_bar_become_si() -> None:
+    section = load(preset="table1").build_arm().sections[0]
+    assert section.rest_length_m == pytest.approx(0.1717)
+    assert section.bend_max_rad == pytest.approx(1.5707963)
+    assert section.length_rate_max_m_s == pytest.approx(0.2)
+    assert section.pressure_max_pa == pytest.approx(1.2e5)
+    assert section.pressure_slew_max_pa_s == pytest.approx(6e5)
+    assert section.lengthening_m_per_pa == pytest.approx(3.233e-7)
+    assert section.softening_m_per_pa2 == pytest.approx(1.044e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "beside"),
+    [
+        ("rate_hz = 1", "rate_hz", "control"),
+        ("[control]\nrate = 1", "control.rate", "rate_hz"),
+        ("[arm]\nsection = 1", "arm.section", "sections"),
+        ("[hardware]\nip = 'x'", "hardware.ip", "device"),
+        ("[log]\nroll_mb = 1", "log.roll_mb", "roll_mib"),
+        ("[zenoh]\nconnect = []", "zenoh.connect", "listen"),
+    ],
+)
+def test_an_unknown_key_is_refused_with_those_there_are(
+    tmp_path: Path, text: str, key: str, beside: str
+) -> None:
+    (line,) = refusals(tmp_path, text)
+    assert line.startswith(f"{key}: no such key; allowed here: ")
+    assert beside in line.partition("allowed here: ")[2].split(", ")
+
+
+def test_an_unknown_key_of_a_section_too(tmp_path: Path) -> None:
+    tables = {"arm": {"sections": [SECTION, SECTION | {"colour": "red"}]}}
+    (line,) = refusals(tmp_path, tomli_w.dumps(tables))
+    assert line.startswith("arm.sections[1].colour: no such key; allowed here: rest_length_mm, ")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[control]\nrate_hz = 10", "control.rate_hz = 10: input should be greater than"),
+        ("[control]\nrate_hz = nan", "control.rate_hz = nan: input should be"),
+        ("[control]\nrate_hz = 'fast'", "control.rate_hz = 'fast': input should be a valid number"),
+        ("[control]\ntip_speed_max_mm_s = inf", "control.tip_speed_max_mm_s = inf: input should"),
+        ("[control]\nlaw = 'pid'", "control.law = 'pid': input should be 'resolved_rate' or"),
+        ("[control]\nrate_hz = '500'", "control.rate_hz = '500': input should be a valid number"),
+        ("[rerun]\nenabled = 1", "rerun.enabled = 1: input should be a valid boolean"),
+        ("[zenoh]\nlisten = ['localhost']", "zenoh.listen[0] = 'localhost': string should match"),
+        ("control = 3", "control = 3: input should be"),
+        ("[hardware]\nadapter = 'festo'", "hardware.adapter = 'festo': input should be 'sim"),
+        ("[log]\nroll_mib = inf", "log.roll_mib = inf: input should be a finite number"),
+        ("[log]\nkeep_gib = nan", "log.keep_gib = nan: input should be"),
+        ("[rerun]\nport = 70000", "rerun.port = 70000: input should be less than or equal to"),
+        ("[rerun]\nport = 1.5", "rerun.port = 1.5: input should be a valid integer"),
+        ("[simulator]\nseed = -1", "simulator.seed = -1: input should be greater than"),
+        ("[zenoh]\nlisten = []", "zenoh.listen = []: tuple should have at least 1 item"),
+        ("[arm]\nname = 'My Arm'", "arm.name = 'My Arm': string should match"),
+        ("[arm]\ngravity_m_s2 = [0, 0]", "arm.gravity_m_s2[2] is missing"),
+        ("preset = 'octopus'", "preset = 'octopus'; allowed: paper, table1, trunk"),
+        ("preset = 3", "preset = 3; allowed: paper, table1, trunk"),
+        ("a = ", "is not TOML: Invalid value"),
+        ("a = " + "[" * 5000, "is not TOML: "),
+    ],
+)
+def test_a_wrong_value_is_refused_with_key_value_and_what_is_allowed(
+    tmp_path: Path, text: str, sentence: str
+) -> None:
+    (line,) = refusals(tmp_path, text)
+    assert line.startswith(sentence)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"length_min_mm": 250.0}, ("length_min_mm = 250", "must increase in this order")),
+        ({"length_max_mm": 150.0}, ("length_max_mm = 150", "must increase in this order")),
+        ({"pressure_min_bar": 0.1}, ("pressure_min_bar = 0.1", "less than or equal to 0")),
+        ({"pressure_max_bar": -0.1}, ("pressure_max_bar = -0.1", "greater than 0")),
+        ({"rest_length_mm": float("nan")}, ("rest_length_mm = nan",)),
+        ({"bend_max_deg": 0}, ("bend_max_deg = 0", "greater than 0")),
+    ],
+)
+def test_bounds_that_contradict_each_other_are_refused(
+    tmp_path: Path, changes: dict[str, float], words: tuple[str, ...]
+) -> None:
+    text = tomli_w.dumps({"arm": {"sections": [SECTION | changes]}})
+    (line,) = refusals(tmp_path, text)
+    assert line.startswith("arm.sections[0]")
+    assert all(word in line for word in words)
+
+
+def test_every_mistake_is_said_at_once(tmp_path: Path) -> None:
+    lines = refusals(tmp_path, "[control]\nrate_hz = 1\nspin = 2\n[rerun]\nport = 0\n")
+    assert [line.split()[0] for line in lines] == ["control.rate_hz", "control.spin:", "rerun.port"]
+
+
+def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"none\.toml cannot be read: No such file"):
+        load(tmp_path / "none.toml")
+    with pytest.raises(ConfigurationError, match="cannot be read: Is a directory"):
+        load(tmp_path)
+    (tmp_path / "binary.toml").write_bytes(os.urandom(8) + b"\xff\xfe")
+    with pytest.raises(ConfigurationError, match=r"binary\.toml is not TOML"):
+        load(tmp_path / "binary.toml")
+
+
+NAMES = st.sampled_from(
+    [*Configuration.model_fields, *SECTION, "rate_hz", "listen", "port", "sections", "name", "0"]
+) | st.text(max_size=5)
+VALUES = st.recursive(
+    st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.dates(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(NAMES, inner, max_size=4),
+    max_leaves=10,
+)
+
+
+def loads_again(configuration: Configuration, path: Path) -> bool:
+    path.write_text(configuration.to_toml())
+    return load(path) == configuration
+
+
+@given(st.dictionaries(NAMES, VALUES, max_size=4))
+def test_whatever_a_file_says_it_is_loaded_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, tables: dict[str, object]
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "own.toml"
+    path.write_text(tomli_w.dumps(tables))
+    with contextlib.suppress(ConfigurationError):
+        assert loads_again(load(path), path)
+    with contextlib.suppress(ConfigurationError):
+        assert loads_again(check(tables), path)
+
+
+def test_a_configuration_is_never_changed() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load().control.rate_hz = 5.0  # type: ignore[misc]
+
+
+def test_addresses(tmp_path: Path) -> None:
+    one = load()
+    assert one.device_address == "simulator:paper"
+    two = loaded(tmp_path, "[hardware]\ndevice = 'bench'\n[rerun]\nbind = '0.0.0.0'\nport = 99\n")
+    assert two.device_address == "simulator:bench"
+    assert rerun_url(one) == "rerun+http://127.0.0.1:9876/proxy"
+    assert rerun_url(two) == "rerun+http://127.0.0.1:99/proxy"
+    assert log_directory(loaded(tmp_path, "[log]\ndirectory = '~/x'")) == Path.home() / "x"
+    assert log_directory(one).name == "sessions"
+
+
+def test_a_calibrated_section_and_response_become_si(tmp_path: Path) -> None:
+    calibrated = SECTION | {
+        "coupling": [[1.1, 0.0, 0.1], [0.0, 1.0, 0.0], [0.0, -0.1, 0.9]],
+        "hysteresis_bar": 0.03,
+        "bending_compliance_deg_per_n_m": 180.0,
+        "axial_compliance_mm_per_n": 2.0,
+    }
+    tables = {"arm": {"sections": [calibrated], "mass_kg": 0.4, "response": {"lag_ms": 80.0}}}
+    arm = loaded(tmp_path, tomli_w.dumps(tables)).build_arm()
+    section = arm.sections[0]
+    assert section.coupling[0] == (1.1, 0.0, 0.1)
+    assert section.hysteresis_pa == pytest.approx(3000.0)
+    assert section.bending_compliance_rad_per_n_m == pytest.approx(np.pi)
+    assert section.axial_compliance_m_per_n == pytest.approx(2e-3)
+    assert (arm.mass_kg, arm.response.lag_s, arm.response.delay_s) == (0.4, 0.08, 0.005)
+
+
+def test_a_coupling_without_an_inverse_is_refused(tmp_path: Path) -> None:
+    flat = SECTION | {"coupling": [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]}
+    (line,) = refusals(tmp_path, tomli_w.dumps({"arm": {"sections": [flat]}}))
+    assert line.startswith("arm: coupling = [[1.0, 0.0, 0.0], [1.0")
+    assert "rows must be independent" in line
+
+
+def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path) -> None:
+    real = load().model_dump(exclude_none=True)["arm"]
+    believed = real | {"sections": [SECTION | {"rest_length_mm": 210.0}]}
+    own = loaded(tmp_path, tomli_w.dumps({"arm": believed, "simulator": {"arm": real}}))
+    assert own.build_arm().sections[0].rest_length_m == pytest.approx(0.21)
+    assert own.build_simulated_arm() == load().build_arm()
+    assert loaded(tmp_path, own.to_toml()) == own
+    two = real | {"sections": [SECTION, SECTION]}
+    (line,) = refusals(tmp_path, tomli_w.dumps({"simulator": {"arm": two}}))
+    assert "simulator.arm has 2 sections, arm has 1" in line
+
+
+WALL = {"shape": "half_space", "normal": [0.0, 0.0, 2.0], "offset_mm": 320.0}
+
+
+def with_keep_outs(*places: dict[str, object], **arm: object) -> dict[str, object]:
+    preset = files("pneuarm.service.configuration").joinpath("presets", "paper.toml")
+    tables = tomllib.loads(preset.read_text())
+    tables["arm"] |= {"keep_outs": list(places), **arm}
+    return tables
+
+
+def test_keep_outs_become_the_arms_in_metres() -> None:
+    ball = {"shape": "sphere", "center_mm": [100.0, 0.0, 200.0], "radius_mm": 30.0}
+    configuration = check(with_keep_outs(WALL, ball, body_radius_mm=45.0))
+    assert check(tomllib.loads(configuration.to_toml())) == configuration
+    arm = configuration.build_arm()
+    assert arm.keep_outs == (HalfSpace((0.0, 0.0, 1.0), 0.32), Sphere((0.1, 0.0, 0.2), 0.03))
+    assert arm.body_radius_m == pytest.approx(0.045)
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        (WALL | {"radius_mm": 3.0}, "a half_space has the keys normal and offset_mm"),
+        ({"shape": "sphere", "radius_mm": 3.0}, "a sphere has the keys center_mm and radius_mm"),
+        (WALL | {"normal": [0.0, 0.0, 0.0]}, "points nowhere"),
+        (WALL | {"shape": "cube"}, "arm.keep_outs"),
+        (WALL | {"offset_mm": 190.0}, "keep_outs[0] contains a part of section 1"),
+    ],
+)
+def test_a_wrong_keep_out_is_refused(place: dict[str, object], said: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        check(with_keep_outs(place))
+    assert said in str(refused.value)

@@ -1,0 +1,84 @@
+"""The viewer stands still or dies: nothing else changes, and it is counted."""
+
+import os
+import signal
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from pneuarm.logs.reading.reader import summarise
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.client.client import Client
+from tools.rig.daemon import Daemon, arm, enough, health_of, keep_moving
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    tables = {"rerun": {"enabled": True, "memory_limit_mib": 32}}
+    with Daemon(tmp_path_factory.mktemp("viewer"), tables) as daemon:
+        yield daemon
+        assert not {"target_stale", "gateway_silent", "fault"} & set(daemon.codes())
+        # A lease may be refused until the client before is gone; a target never.
+        refused = [event.text for event in daemon.events() if event.code == "rejected"]
+        assert not [text for text in refused if text.startswith("cmd/target")]
+        assert summarise(daemon.log()).missing_ticks == 0
+
+
+@pytest.fixture
+def client(daemon: Daemon) -> Iterator[Client]:
+    with daemon.client() as client:
+        arm(client)
+        yield client
+
+
+def viewer(client: Client) -> pb.ProcessHealth:
+    """Return what health tells of the viewer."""
+    rows = [process for process in health_of(client).processes if process.name == "viewer"]
+    return rows[0] if rows else pb.ProcessHealth()
+
+
+def listens(daemon: Daemon) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", daemon.rerun_port)) == 0
+
+
+def test_viewer_serves(daemon: Daemon, client: Client) -> None:
+    daemon.pids("viewer", "rerun")
+    keep_moving(client, lambda: listens(daemon), "Rerun's server")
+    with socket.socket() as other:  # and on loopback only
+        other.bind(("127.0.0.2", daemon.rerun_port))
+
+
+def test_viewer_stopped_changes_nothing_and_its_skips_are_counted(
+    daemon: Daemon, client: Client
+) -> None:
+    known = daemon.pids("viewer")["viewer"]
+    before = viewer(client).dropped
+    os.kill(known, signal.SIGSTOP)
+    try:
+        keep_moving(client, enough(4.5), "movement while the viewer stands still")
+    finally:
+        os.kill(known, signal.SIGCONT)
+    keep_moving(client, lambda: viewer(client).dropped > before + 500, "the skips in health")
+    assert viewer(client).pid == known
+    assert viewer(client).restarts == 0
+
+
+def test_viewer_killed_is_started_again_and_counted(daemon: Daemon, client: Client) -> None:
+    killed = daemon.pids("viewer")["viewer"]
+    os.kill(killed, signal.SIGKILL)
+    keep_moving(client, lambda: viewer(client).restarts == 1, "the restart in health")
+    assert viewer(client).pid != killed
+    assert "viewer_restarted" in {event.code for event in client.events()}
+    keep_moving(client, lambda: listens(daemon), "Rerun's server again")
+
+
+def test_rerun_killed_is_started_again(daemon: Daemon, client: Client) -> None:
+    killed = daemon.pids("rerun")["rerun"]
+    os.kill(killed, signal.SIGKILL)
+    keep_moving(
+        client,
+        lambda: daemon.pids("viewer").get("rerun", killed) != killed and listens(daemon),
+        "another server",
+    )

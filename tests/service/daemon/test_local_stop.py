@@ -1,0 +1,131 @@
+"""The lock on a device, and the stop past the network."""
+
+import os
+import socket
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from pneuarm.controllers.arm.errors import ConfigurationError, DaemonUnreachable, NotConfirmed
+from pneuarm.service.daemon import local_stop
+from pneuarm.service.daemon.local_stop import lock, stop_locally
+
+NAME = f"test-lock-{os.getpid()}"
+
+
+def test_a_second_lock_is_refused_with_the_process_that_holds_it() -> None:
+    with lock("device", NAME):
+        with pytest.raises(ConfigurationError) as caught:
+            lock("device", NAME)
+        assert str(caught.value) == (
+            f"device {NAME!r} is in use by another pneuarm daemon (process {os.getpid()}); stop "
+            "that one first, or name another device"
+        )
+        lock("device", NAME + "-2").close()
+        lock("arm", NAME).close()  # the two kinds are apart
+    lock("device", NAME).close()
+
+
+HOLD_A_LOCK = """
+import sys
+from pneuarm.service.daemon.local_stop import lock
+held = lock("device", sys.argv[1])
+print(flush=True)
+sys.stdin.read()
+"""
+
+
+def test_the_lock_of_another_process_is_seen_and_goes_with_it_however_it_ends() -> None:
+    other = subprocess.Popen(
+        [sys.executable, "-c", HOLD_A_LOCK, NAME], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert other.stdout is not None
+    assert other.stdin is not None
+    other.stdout.readline()
+    with pytest.raises(ConfigurationError, match=rf"\(process {other.pid}\)"):
+        lock("device", NAME)
+    other.kill()
+    other.wait()
+    lock("device", NAME).close()
+    other.stdin.close()
+    other.stdout.close()
+
+
+def test_the_lock_does_not_leak_into_programs_that_are_started() -> None:
+    held = lock("device", NAME)
+    assert not os.get_inheritable(held.fileno())
+    held.close()
+
+
+class Answering:
+    """Stands for the supervisor: takes what comes and answers, or does not."""
+
+    def __init__(self, answer: bytes | None) -> None:
+        self.heard: list[bytes] = []
+        self._answer = answer
+        self._listener = lock("arm", NAME)
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        connection, _ = self._listener.accept()
+        with connection:
+            self.heard.append(connection.recv(16))
+            if self._answer is None:
+                self._done.wait(20)
+            else:
+                connection.sendall(self._answer)
+
+    def end(self) -> None:
+        self._done.set()
+        self._thread.join(20)
+        self._listener.close()
+
+
+@pytest.fixture(autouse=True)
+def _short_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local_stop, "_CONFIRM_S", 0.3)
+
+
+def test_a_stop_that_acted_is_confirmed() -> None:
+    supervisor = Answering(b"stopped\n")
+    stop_locally(NAME)
+    supervisor.end()
+    assert supervisor.heard == [b"estop\n"]
+
+
+@pytest.mark.parametrize("answer", [b"refused\n", b"", b"stop", None])
+def test_anything_else_is_not_confirmed(answer: bytes | None) -> None:
+    supervisor = Answering(answer)
+    with pytest.raises(NotConfirmed, match=f"^NOT CONFIRMED: .*{NAME}.* cut the air supply$"):
+        stop_locally(NAME)
+    supervisor.end()
+
+
+def test_without_a_daemon_on_this_machine_it_says_so() -> None:
+    with pytest.raises(DaemonUnreachable, match=f"no daemon for arm '{NAME}' runs") as caught:
+        stop_locally(NAME)
+    assert not isinstance(caught.value, NotConfirmed)
+
+
+def test_a_supervisor_that_is_stuck_does_not_hold_up_who_stops() -> None:
+    with lock("arm", NAME), pytest.raises(NotConfirmed):  # nobody accepts
+        stop_locally(NAME)
+
+
+def test_a_stuck_supervisor_with_a_full_queue_neither() -> None:
+    held = lock("arm", NAME)
+    others = []
+    for _ in range(20):
+        other = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        other.setblocking(False)
+        others.append(other)
+        if other.connect_ex(f"\0pneuarm/arm/{NAME}"):
+            break
+    with pytest.raises(NotConfirmed):
+        stop_locally(NAME)
+    for other in (*others, held):
+        other.close()

@@ -1,0 +1,341 @@
+"""Each monitor alone, at its threshold and at its persistence."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from math import exp, inf, nan
+
+import numpy as np
+import pytest
+
+from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.arm.arm import Response
+from pneuarm.controllers.kinematics.compiled import CompiledKinematics
+from pneuarm.service.modes.mode import Mode
+from pneuarm.service.safety.faults import FaultCode
+from pneuarm.service.safety.monitors.age import Age
+from pneuarm.service.safety.monitors.device import Complaints, StopInput
+from pneuarm.service.safety.monitors.estimate import Estimate
+from pneuarm.service.safety.monitors.frozen import Frozen
+from pneuarm.service.safety.monitors.lag import Lag
+from pneuarm.service.safety.monitors.leak import SETTLED_S, Leak
+from pneuarm.service.safety.monitors.model_holds import ModelHolds
+from pneuarm.service.safety.monitors.monitor import Lasting, Monitor, Seen, bar, chamber
+from pneuarm.service.safety.monitors.overpressure import Overpressure
+from pneuarm.service.safety.monitors.overruns import Overruns
+from pneuarm.service.safety.monitors.pressure_follows import LAG_UNCERTAINTY, PressureFollows
+from pneuarm.service.safety.monitors.sensor_range import SensorRange
+from pneuarm.service.safety.monitors.setpoint import Setpoint
+from pneuarm.service.safety.monitors.supply import Supply
+from pneuarm.service.safety.monitors.tip_model import OLDEST_S, TipModel
+from tools.rig.arms import paper_arm, table1_arm
+
+ARM = paper_arm()
+HIGH, LOW = ARM.sections[0].pressure_max_pa, ARM.sections[0].pressure_min_pa
+LASTING_S, DT_S = 0.1, 0.01
+
+WELL = Seen(
+    now_s=0.0,
+    dt_s=DT_S,
+    mode=Mode.ACTIVE,
+    vented=False,
+    measured_pa=[1e4, 2e4, 3e4],
+    sent_pa=[1e4, 2e4, 3e4],
+    expected_pa=[1e4, 2e4, 3e4],
+    age_s=0.0,
+    supply_pa=nan,
+    setpoints_pa=None,
+    lengths_m=[nan, nan, nan],
+    estimated_m=[0.2, 0.2, 0.2],
+    tip_error_m=nan,
+    overruns=0,
+    complaints=(),
+    stop_pressed=False,
+)
+
+
+def told_after(monitor: Monitor, seen: Seen, seconds: float = 1.0) -> float:
+    """Time from the beginning of something to the first word about it; infinite if none comes."""
+    for number in range(round(seconds / DT_S) + 1):
+        if monitor.look(replace(seen, now_s=number * DT_S)):
+            return number * DT_S
+    return inf
+
+
+@pytest.mark.parametrize(
+    ("make", "well", "ill", "words"),
+    [
+        (
+            lambda: PressureFollows(1e4, LASTING_S, 1.0),
+            {"measured_pa": [1e4, 2e4 + 1e4, 3e4]},
+            {"measured_pa": [1e4, 2e4 - 1e4 - 1.0, 3e4]},
+            "section 1, chamber 2 has 0.100 bar; 0.200 bar was expected",
+        ),
+        (
+            lambda: Overpressure(ARM, 1e4, LASTING_S),
+            {"measured_pa": [HIGH + 1e4, 0.0, LOW - 1e5]},
+            {"measured_pa": [0.0, 0.0, HIGH + 1e4 + 1.0]},
+            "section 1, chamber 3 has",
+        ),
+        (
+            lambda: SensorRange(ARM, 1e4, LASTING_S),
+            {"measured_pa": [HIGH + 1e4, LOW - 1e4, 0.0]},
+            {"measured_pa": [HIGH + 1e4 + 1.0, 0.0, 0.0]},
+            "section 1, chamber 1 reads",
+        ),
+        (
+            lambda: SensorRange(ARM, 1e4, LASTING_S),
+            {},
+            {"measured_pa": [0.0, nan, 0.0]},
+            "section 1, chamber 2 reads nan bar",
+        ),
+        (
+            lambda: Supply(1.1e5, LASTING_S),
+            {"supply_pa": 1.1e5},
+            {"supply_pa": 1.1e5 - 1.0},
+            "the supply has 1.100 bar; at least 1.100 bar are needed",
+        ),
+        (
+            lambda: ModelHolds(ARM, 0.02, 0.05, LASTING_S),
+            {"tip_error_m": 0.05},
+            {"tip_error_m": 0.0501},
+            "the measured tip is 50 mm from the model's (allowed: 50)",
+        ),
+        (
+            lambda: Estimate(ARM, 0.01, LASTING_S),
+            {"estimated_m": [0.0901, 0.2, 0.3099]},
+            {"estimated_m": [0.2, 0.3101, 0.2]},
+            "section 1, chamber 2 is estimated at 310 mm; 90 to 310 mm are possible",
+        ),
+        (
+            lambda: Estimate(ARM, 0.01, LASTING_S),
+            {},
+            {"estimated_m": [nan, 0.2, 0.2]},
+            "section 1, chamber 1 is estimated at nan mm",
+        ),
+        (
+            lambda: Setpoint(1e3, LASTING_S),
+            {"setpoints_pa": [1.1e4, 1.9e4, 3e4]},
+            {"setpoints_pa": [1.1e4 + 1.0, 2e4, 3e4]},
+            "section 1, chamber 1 is set to 0.110 bar on the device; we sent 0.100 bar",
+        ),
+    ],
+)
+def test_beyond_its_threshold_and_after_its_persistence(
+    make: Callable[[], Monitor], well: dict[str, object], ill: dict[str, object], words: str
+) -> None:
+    assert told_after(make(), replace(WELL, **well)) == inf  # type: ignore[arg-type]
+    sick = replace(WELL, **ill)  # type: ignore[arg-type]
+    assert told_after(make(), sick) == pytest.approx(LASTING_S + DT_S)
+    monitor = make()
+    told_after(monitor, sick)
+    assert words in monitor.look(replace(sick, now_s=1.0))
+    assert monitor.look(replace(WELL, now_s=1.01)) == ""
+    assert monitor.look(replace(sick, now_s=1.02)) == ""  # it has to last anew
+
+
+def test_lasting_is_without_a_break_and_longer_than() -> None:
+    lasting = Lasting()
+    assert [lasting.longer(True, t, 1.0) for t in (0.0, 0.9, 1.0, 1.01)] == [False] * 3 + [True]
+    assert not lasting.longer(False, 1.1, 1.0)
+    assert [lasting.longer(True, t, 1.0) for t in (1.2, 2.0, 2.3)] == [False, False, True]
+    assert not Lasting().longer(True, 5.0, 0.0)
+
+
+def test_chambers_are_counted_from_one_and_pressures_told_in_bar() -> None:
+    assert [chamber(i) for i in (0, 2, 3)] == [
+        "section 1, chamber 1",
+        "section 1, chamber 3",
+        "section 2, chamber 1",
+    ]
+    assert bar(12345.6) == "0.123 bar"
+
+
+# --- the pressure follows ----------------------------------------------------------------------
+
+
+def test_the_lag_is_of_first_order_and_exact_for_any_step() -> None:
+    response = Response(delay_s=0.0, lag_s=0.06)
+    lag, coarse = Lag(response), Lag(response)
+    lag.advance([0.0], [500.0], 0.0)
+    coarse.advance([0.0], [500.0], 0.0)
+    for _ in range(60):
+        fine = lag.advance([1e5], [0.0], 1e-3)
+    assert fine == pytest.approx(coarse.advance([1e5], [0.0], 0.06))
+    assert fine == pytest.approx([1e5 + exp(-1.0) * (500.0 - 1e5)])
+    assert Lag(response).advance([7.0, 7.0], [nan, 3.0], 1.0) == [0.0, 3.0]
+
+
+@pytest.mark.parametrize("step_s", [1e-3, 4e-3, 0.05])
+def test_a_command_acts_after_the_dead_time_however_long_a_step_is(step_s: float) -> None:
+    lag = Lag(Response(delay_s=0.005, lag_s=0.06))
+    lag.advance([0.0], [0.0], 0.0)
+    for index in range(round(0.2 / step_s)):
+        expected = lag.advance([1e5], [0.0], step_s)
+        passed_s = (index + 1) * step_s - 0.005
+        assert expected == pytest.approx([1e5 * (1.0 - exp(-max(0.0, passed_s) / 0.06))])
+
+
+def test_without_a_lag_the_pressure_is_there_when_the_dead_time_is_over() -> None:
+    lag = Lag(Response(delay_s=0.005, lag_s=0.0))
+    lag.advance([0.0], [0.0], 0.0)
+    assert lag.advance([1e5], [0.0], 0.004) == [0.0]
+    assert lag.advance([2e5], [0.0], 0.004) == [1e5]
+    assert lag.advance([2e5], [0.0], 0.004) == [2e5]
+
+
+def test_in_a_move_the_lag_may_be_wrong_by_its_uncertainty() -> None:
+    to_go_pa = 4e4
+    allowed_pa = 1e4 + LAG_UNCERTAINTY * to_go_pa
+    moving = replace(WELL, sent_pa=[1e4 + to_go_pa, 2e4, 3e4])
+    for off_pa, expected in ((allowed_pa - 1.0, inf), (allowed_pa + 1.0, LASTING_S + DT_S)):
+        seen = replace(moving, measured_pa=[1e4 - off_pa, 2e4, 3e4])
+        assert told_after(PressureFollows(1e4, LASTING_S, 1.0), seen) == pytest.approx(expected)
+
+
+def test_a_vented_chamber_has_longer_but_a_fault_does_not_go_by_venting() -> None:
+    full = replace(WELL, measured_pa=[5e4, 0.0, 0.0], sent_pa=[0.0] * 3, expected_pa=[0.0] * 3)
+    vented = replace(full, vented=True, mode=Mode.IDLE)
+    assert told_after(PressureFollows(1e4, LASTING_S, 0.5), vented) == pytest.approx(0.5 + DT_S)
+    monitor = PressureFollows(1e4, LASTING_S, 0.5)
+    told_after(monitor, full)
+    assert monitor.look(replace(vented, now_s=LASTING_S + 2 * DT_S))
+
+
+# --- the others --------------------------------------------------------------------------------
+
+
+def held(monitor: Leak, pressures_pa: Callable[[float], list[float]], seconds: float) -> float:
+    """Hold for some time; return when the leak is told, from the end of the settling."""
+    for number in range(round(seconds / DT_S)):
+        now_s = number * DT_S
+        seen = replace(WELL, now_s=now_s, mode=Mode.HOLD, measured_pa=pressures_pa(now_s))
+        if monitor.look(seen):
+            return now_s - SETTLED_S
+    return inf
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_held_pressure_that_falls_is_a_leak_and_one_that_rises_is_none(sign: float) -> None:
+    def falling(now_s: float) -> list[float]:
+        return [0.0, sign * (5e4 - 1e4 * now_s), 0.0]
+
+    def rising(now_s: float) -> list[float]:
+        return [0.0, sign * (5e4 + 1e4 * now_s), 0.0]
+
+    # 3000 Pa are lost after 0.3 s, and that must last.
+    assert held(Leak(3e3, LASTING_S), falling, 5.0) == pytest.approx(0.4, abs=0.05)
+    assert held(Leak(3e3, LASTING_S), rising, 5.0) == inf
+
+
+def test_what_settles_after_the_hold_begins_is_no_leak_nor_is_noise() -> None:
+    rng = np.random.default_rng(0)
+
+    def settling(now_s: float) -> list[float]:
+        noise = rng.normal(0.0, 240.0, 3)
+        return (5e4 + 2e4 * exp(-now_s / 0.072) + noise).tolist()
+
+    assert held(Leak(3e3, LASTING_S), settling, 60.0) == inf
+
+
+def test_a_leak_is_looked_for_only_while_holding_and_anew_in_every_hold() -> None:
+    leak = Leak(3e3, LASTING_S)
+    falling = [replace(WELL, now_s=t * DT_S, measured_pa=[5e4 - 2e2 * t] * 3) for t in range(200)]
+    assert not any(leak.look(seen) for seen in falling)
+    assert held(leak, lambda now_s: [2e4] * 3, 3.0) == inf
+    leak.look(WELL)
+    assert held(leak, lambda now_s: [1e4] * 3, 3.0) == inf  # another hold, another start
+    assert held(Leak(3e3, LASTING_S), lambda now_s: [2e3 - 4e3 * now_s] * 3, 3.0) == inf
+
+
+def test_a_reading_is_frozen_only_when_its_command_moves() -> None:
+    frozen = Frozen(5e3, LASTING_S)
+    assert told_after(frozen, WELL, 100.0) == inf  # the same to the bit for 100 s
+    moved = replace(WELL, expected_pa=[1e4, 2e4, 3e4 + 5e3])
+    assert told_after(frozen, moved) == inf
+    moved = replace(WELL, expected_pa=[1e4, 2e4 - 5e3 - 1.0, 3e4])
+    assert told_after(frozen, moved) == pytest.approx(LASTING_S + DT_S)
+    assert "section 1, chamber 2 stands at 0.200 bar while its command moved 0.050 bar" in (
+        frozen.look(replace(moved, now_s=2.0))
+    )
+    one_bit = [1e4, math.nextafter(2e4, inf), 3e4]
+    assert frozen.look(replace(moved, now_s=2.1, measured_pa=one_bit)) == ""
+    assert told_after(frozen, replace(moved, measured_pa=one_bit)) == inf
+
+
+def test_a_slow_and_coarse_sensor_is_not_frozen() -> None:
+    frozen = Frozen(5e3, LASTING_S)
+    for number in range(2000):  # 1 kHz, the device answers at 50 Hz in whole millibars
+        true = 4e4 * math.sin(2.0 * math.pi * 0.5 * number * 1e-3)
+        device = 4e4 * math.sin(2.0 * math.pi * 0.5 * (number - number % 20) * 1e-3)
+        seen = replace(
+            WELL,
+            now_s=number * 1e-3,
+            measured_pa=[100.0 * round(device / 100.0)] * 3,
+            expected_pa=[true] * 3,
+        )
+        assert frozen.look(seen) == ""
+
+
+def test_lengths_are_compared_with_the_map_of_their_pressures() -> None:
+    for arm in (paper_arm(), table1_arm()):
+        pressures = np.array([[1e4, 2e4, 3e4]])
+        lengths = PressureMap(arm).lengths_m(pressures)
+        for off_m, expected in ((0.0199, inf), (-0.0201, LASTING_S + DT_S)):
+            seen = replace(WELL, lengths_m=[*lengths[0, :2].tolist(), float(lengths[0, 2]) + off_m])
+            monitor = ModelHolds(arm, 0.02, 0.05, LASTING_S)
+            assert told_after(monitor, seen) == pytest.approx(expected)
+    assert "section 1, chamber 3 measures" in monitor.look(replace(seen, now_s=9.0))
+    some = replace(WELL, lengths_m=[nan, 0.4, nan])  # one sensor only
+    assert told_after(ModelHolds(ARM, 0.02, 0.05, LASTING_S), some) < inf
+
+
+def test_the_age_is_its_own_persistence() -> None:
+    age = Age(FaultCode.MEASUREMENT_OLD, 0.15)
+    assert age.look(replace(WELL, age_s=0.15)) == ""
+    assert age.look(replace(WELL, age_s=0.151)) == "the measurement is 151 ms old (allowed: 150 ms)"
+    assert age.look(replace(WELL, age_s=-1.0)) == ""
+
+
+@pytest.mark.parametrize(("missed", "told"), [(5, False), (6, True)])
+def test_overruns_are_a_fraction_of_a_second(missed: int, told: bool) -> None:
+    overruns = Overruns(0.05)
+    words = ""
+    for number in range(101):
+        words = overruns.look(
+            replace(WELL, now_s=number * DT_S, overruns=100 + missed * (number > 50))
+        )
+    assert bool(words) == told
+    if told:
+        assert words == "6 of 107 deadlines were missed in a second"
+        for number in range(101, 202):
+            words = overruns.look(replace(WELL, now_s=number * DT_S, overruns=106))
+        assert words == ""
+
+
+def test_a_setpoint_between_our_command_and_its_lagged_value_is_ours() -> None:
+    moving = replace(WELL, sent_pa=[5e4] * 3, expected_pa=[1e4] * 3)
+    for setpoint_pa, expected in ((1e4 - 999.0, inf), (5e4 + 999.0, inf), (3e4, inf), (nan, inf)):
+        seen = replace(moving, setpoints_pa=[setpoint_pa] * 3)
+        assert told_after(Setpoint(1e3, LASTING_S), seen) == expected
+    for setpoint_pa in (1e4 - 1001.0, 5e4 + 1001.0):
+        seen = replace(moving, setpoints_pa=[setpoint_pa] * 3)
+        assert told_after(Setpoint(1e3, LASTING_S), seen) < inf
+
+
+def test_what_the_device_says_is_passed_on_at_once() -> None:
+    assert Complaints().look(replace(WELL, complaints=("hot", "low"))) == "hot; low"
+    assert (Complaints().look(WELL), StopInput().look(WELL)) == ("", "")
+    assert StopInput().look(replace(WELL, stop_pressed=True))
+
+
+def test_the_tip_is_compared_once_a_measurement_and_forgotten_when_old() -> None:
+    model = TipModel(ARM)
+    pressures = np.array([[1e4, 2e4, 3e4]])
+    tip = CompiledKinematics(ARM).evaluate(PressureMap(ARM).lengths_m(pressures))
+    measured = tip.position_m + np.array([0.0, 0.03, 0.04])
+    assert model.error_m(measured, 10, pressures, 10) == pytest.approx(0.05)
+    later = 10 + int(OLDEST_S * 1e9)
+    assert model.error_m(measured, 10, 0.0 * pressures, later) == pytest.approx(0.05)
+    assert math.isnan(model.error_m(measured, 10, pressures, later + 1000))
+    assert model.error_m(measured, 20, 0.0 * pressures, 20) > 0.051

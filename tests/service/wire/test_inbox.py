@@ -1,0 +1,25 @@
+"""A position out of reach is taken, and said to be out of reach, once."""
+
+from pathlib import Path
+
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from tools.rig.daemon import Daemon, wait_for
+
+
+def test_out_of_reach_is_said_once_with_the_limit_and_the_nearest_point(tmp_path: Path) -> None:
+    with Daemon(tmp_path) as daemon, daemon.client() as client:
+        client.enable()
+        found: list[pb.Event] = []
+
+        def told() -> list[pb.Event]:
+            client.send_position((0.3, 0.0, 0.1))
+            found.extend(event for event in client.events() if event.code == "out_of_reach")
+            return found
+
+        event = wait_for(told, "an event that says so")[0]
+        for _ in range(20):
+            told()
+        assert len(found) == 1
+        assert "length binds; the nearest reachable point is (" in event.text
+        client.send_position((0.0, 0.0, 0.2))
+        assert wait_for(lambda: told()[1:], "a second one after a target within reach")
