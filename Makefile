@@ -43,7 +43,7 @@ check: setup
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
 # The finite elements are recorded; `python -m tools.validation.finite_elements` solves them anew.
 validate: bench-setup
-	$(BIN)/python -m pneuarm.service.validation.report --out docs
+	$(BIN)/python -m tools.validation.report --out docs
 
 # Every benchmark, one after another, on a machine that does nothing else; writes its table.
 bench: bench-setup

@@ -1,1 +1,1 @@
-"""The figures of the validation: the paper's table 1, gravity, the models side by side."""
+"""What `pneuarm validate table1` computes: the arm of the paper's table 1, without and with gravity."""

@@ -1,8 +1,8 @@
 """How long one whole step of the inverse kinematics takes, beside its peers, on one core.
 
     make bench-setup
-    .venv/bin/python tools/bench/ik.py --json
-    .venv/bin/python tools/bench/ik.py --reach --json     # the campaign of tools/bench/reach.py too
+    .venv/bin/python -m tools.bench.ik --json
+    .venv/bin/python -m tools.bench.ik --reach --json     # the campaign of tools/bench/reach.py too
 
 A step is what the loop calls: error, Jacobian, QP, solution, exact checks, verdict, by
 ``Controller.step``. Two motions: ``ik_us`` between random reachable positions, where most QPs are
@@ -17,9 +17,6 @@ import platform
 import statistics
 import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
@@ -85,7 +82,7 @@ class Candidate:
 def peers() -> dict[str, float] | None:
     """Medians of the peers, once; None where their packages are missing."""
     try:
-        from tools.bench.ik_peers import peers_us  # type: ignore[import-not-found]
+        from tools.bench.ik_peers import peers_us
     except ImportError:
         return None
     found: dict[str, float] = peers_us()

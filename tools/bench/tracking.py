@@ -1,6 +1,6 @@
 """How well the tip follows: the real loop on simulated time, a simulated camera, gravity on.
 
-    .venv/bin/python tools/bench/tracking.py --json
+    .venv/bin/python -m tools.bench.tracking --json
 
 Every figure is of the true tip. The camera takes 100 poses a second, which arrive 10 ms late with
 0.1 mm of noise on every axis. Each seed is another arm of the family; the calibrated one has what
@@ -11,10 +11,7 @@ with which the constants of reference and correction were chosen.
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from pneuarm.controllers.workspace.summary import Summary, summarise
 from pneuarm.service.configuration.configuration import load
-from pneuarm.service.validation.text import markdown_table
 from pneuarm.service.workspace.command import as_dict
 from pneuarm.service.workspace.picture import write_png
+from tools.validation.markdown import markdown_table
 
 _PICTURES = Path(__file__).parents[2] / "docs" / "images"
 _SAMPLES = 20_000
