@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo faults test test-slow check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults test test-slow check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -52,6 +52,10 @@ bench: bench-setup
 # The peers that the benchmarks compare with; nothing else needs them.
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
+
+# The tables of docs/ that stand in the code: keys, messages, faults, modes.
+docs: setup
+	$(BIN)/python -m tools.docs
 
 proto: setup
 	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. pneuarm/logs/schema/pneuarm.proto

@@ -1,1 +1,1 @@
-"""What `pneuarm validate table1` computes: the arm of the paper's table 1, without and with gravity."""
+"""What `pneuarm validate table1` computes: the arm of table 1, without and with gravity."""

@@ -1,0 +1,60 @@
+"""The tables of the mode machine, of faults, of exceptions and of the simulated arm."""
+
+from dataclasses import fields
+
+from pneuarm.controllers.arm import errors
+from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
+from pneuarm.service.safety.faults import FAULTS, FaultCode
+from tools.docs.regions import linked, table
+
+
+def make_modes(name: str) -> str:
+    """Return what each event makes of each mode."""
+    rows = []
+    for event in ModeEvent:
+        after = [TABLE.get((mode, event)) for mode in Mode]
+        cells = ["" if mode is None else mode.name.lower() for mode in after]
+        rows.append([f"`{event.name}`", linked(event.cause), *cells])
+    return table(("event", "cause", *(mode.name.lower() for mode in Mode)), rows)
+
+
+def make_faults(name: str) -> str:
+    """Return every fault with its bit, its policy, its cause, what follows, and the remedy."""
+    rows = []
+    for code in FaultCode:
+        fault = FAULTS[code]
+        words = [fault.policy.name.lower(), fault.cause, fault.consequence, fault.remedy]
+        rows.append([f"`{code.name.lower()}`", f"{1 << code}", *words])
+    return table(("code", "bit", "policy", "cause", "consequence", "remedy"), rows)
+
+
+def make_exceptions(name: str) -> str:
+    """Return the tree of exceptions, each with the first sentence of what it says of itself."""
+    return table(("exception", "a kind of", "means"), _below(errors.PneuarmError))
+
+
+def _below(kind: type[Exception]) -> list[list[str]]:
+    first = " ".join((kind.__doc__ or "").split()).partition(". ")[0].rstrip(".")
+    rows = [[f"`{kind.__name__}`", f"`{kind.__bases__[0].__name__}`", first]]
+    for inner in kind.__subclasses__():
+        if inner.__module__ == errors.__name__:
+            rows += _below(inner)
+    return rows
+
+
+def make_simulator(name: str) -> str:
+    """Return the nominal parameters of the simulated arm."""
+    rows = [
+        [f"`{part.name}`", str(part.default), _unit(part.name), part.metadata["meaning"]]
+        for part in fields(SimulatorParameters)
+    ]
+    return table(("parameter", "nominal", "unit", "meaning"), rows)
+
+
+#: Unit of a parameter by the end of its name.
+_UNITS = {"kg_m": "kg/m", "kg": "kg", "hz": "Hz", "pa": "Pa", "m": "m", "s": "s"}
+
+
+def _unit(name: str) -> str:
+    return next((unit for end, unit in _UNITS.items() if name.endswith(f"_{end}")), "")
