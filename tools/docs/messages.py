@@ -2,6 +2,7 @@
 
 import tempfile
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 
 from google.protobuf.descriptor import FieldDescriptor
@@ -21,6 +22,9 @@ from tools.docs.regions import NoSuchTable, linked, table
 
 ROOT = Path(__file__).resolve().parents[2]
 PROTO = "pneuarm/logs/schema/pneuarm.proto"
+
+#: Where protoc finds the messages of its own, as its command line does by itself.
+_GOOGLE = files("grpc_tools").joinpath("_proto")
 
 #: Unit of a field by the end of its name, the longest first.
 UNITS = {
@@ -52,8 +56,8 @@ def _file() -> FileDescriptorProto:
     """Read the .proto with its comments; the generated classes have none."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "set"
-        arguments = ["protoc", f"-I{ROOT}", f"--descriptor_set_out={path}", PROTO]
-        if protoc.main([*arguments, "--include_source_info"]):
+        arguments = ["protoc", f"-I{ROOT}", f"-I{_GOOGLE}", f"--descriptor_set_out={path}"]
+        if protoc.main([*arguments, "--include_source_info", PROTO]):
             raise RuntimeError(f"protoc does not read {PROTO}: see above")
         return FileDescriptorSet.FromString(path.read_bytes()).file[0]
 
