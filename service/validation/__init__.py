@@ -1,1 +1,1 @@
-"""What `pneuarm validate table1` computes: the arm of table 1, without and with gravity."""
+"""`pneuarm validate table1`: the arm of table 1 identified, computed without and with gravity."""

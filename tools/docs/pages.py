@@ -20,6 +20,7 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "modes": tables.make_modes,
     "faults": tables.make_faults,
     "exceptions": tables.make_exceptions,
+    "rooms": tables.make_rooms,
     "simulator": tables.make_simulator,
 }
 

@@ -1,12 +1,18 @@
 """The tables of the mode machine, of faults, of exceptions and of the simulated arm."""
 
+import ast
 from dataclasses import fields
+from pathlib import Path
 
 from pneuarm.controllers.arm import errors
 from pneuarm.hardware.simulator.parameters import SimulatorParameters
 from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
 from pneuarm.service.safety.faults import FAULTS, FaultCode
 from tools.docs.regions import linked, table
+
+ROOT = Path(__file__).resolve().parents[2]
+#: The packages, from the top down.
+PACKAGES = ("service", "logs", "hardware", "controllers")
 
 
 def make_modes(name: str) -> str:
@@ -58,3 +64,16 @@ _UNITS = {"kg_m": "kg/m", "kg": "kg", "hz": "Hz", "pa": "Pa", "m": "m", "s": "s"
 
 def _unit(name: str) -> str:
     return next((unit for end, unit in _UNITS.items() if name.endswith(f"_{end}")), "")
+
+
+def make_rooms(name: str) -> str:
+    """Return the rooms of the packages, each with what its `__init__.py` says of it."""
+    inits = [
+        init for package in PACKAGES for init in sorted((ROOT / package).glob("*/__init__.py"))
+    ]
+    rows = [[f"`{init.parent.relative_to(ROOT)}`", _docstring(init)] for init in inits]
+    return table(("room", "what"), rows)
+
+
+def _docstring(path: Path) -> str:
+    return ast.get_docstring(ast.parse(path.read_text())) or ""
