@@ -25,6 +25,7 @@ from pneuarm.controllers.kinematics.constant_curvature import tip_transform
 from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.targets.targets import PositionTarget
+from tools.bench.ik_peers import peers_us
 from tools.rig.arms import paper_arm, random_lengths
 
 DT_S = 1e-3
@@ -82,11 +83,9 @@ class Candidate:
 def peers() -> dict[str, float] | None:
     """Medians of the peers, once; None where their packages are missing."""
     try:
-        from tools.bench.ik_peers import peers_us
-    except ImportError:
+        return peers_us()
+    except ModuleNotFoundError:
         return None
-    found: dict[str, float] = peers_us()
-    return found or None
 
 
 def figures(rounds: int) -> dict[str, object]:

@@ -118,7 +118,7 @@ def test_the_elastica_is_the_rod_that_does_not_stretch(weight_over_bending: floa
     [
         ((0.0, 0.5, 1.0), "length_m = 0"),
         ((np.nan, 0.5, 1.0), "length_m = nan"),
-        ((0.2, 7.0, 1.0), "theta_rad = 7: .*full turn"),
+        ((0.2, 7.0, 1.0), "theta_rad = 7"),
         ((0.2, 0.5, np.inf), "weight_over_bending_per_m2 = inf"),
     ],
 )
@@ -130,21 +130,21 @@ def test_an_elastica_that_cannot_be_is_refused(arguments: tuple[float, ...], tex
 @pytest.mark.parametrize("rows", [[], [3], [-1, 0]])
 def test_a_fit_on_rows_that_are_not_there_is_refused(rows: list[int]) -> None:
     table = read_table()
-    with pytest.raises(InvalidInput, match=r"rows = .*allowed are one or more of 0 to 2"):
+    with pytest.raises(InvalidInput, match=r"rows = .*0 to 2"):
         fit_rows(table, identify(table), rows)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "found no rows; the columns are pressure_bar"),
-        (SHARED.replace("y_cc_mm", "y"), "found pressure_bar, y_measured_mm, z_measured_mm, y,"),
-        ("\n".join(SHARED.splitlines()[:3]), "has 2 rows"),
-        (SHARED.replace("33.6", "x"), r"row 2, y_measured_mm = 'x': it must be a number above 0"),
+        ("", ".*".join(COLUMNS)),
+        (SHARED.replace("y_cc_mm", "y"), "z_measured_mm, y,.*y_cc_mm"),
+        ("\n".join(SHARED.splitlines()[:3]), "2 rows.*3"),
+        (SHARED.replace("33.6", "x"), r"row 2, y_measured_mm = 'x'.*above 0"),
         (SHARED.replace("33.6", "nan"), r"row 2, y_measured_mm = 'nan'"),
         (SHARED.replace("33.6", "-33.6"), r"row 2, y_measured_mm = '-33.6'"),
         (SHARED.replace(",12.8,0.5", ""), r"row 3, error_y_percent = None"),
-        (SHARED.replace("12.8,0.5", "12.8,0.5,7"), r"row 3 has more values than the 7 columns"),
+        (SHARED.replace("12.8,0.5", "12.8,0.5,7"), "row 3.*7 columns"),
     ],
 )
 def test_a_wrong_table_is_refused(tmp_path: Path, text: str, message: str) -> None:
@@ -156,10 +156,10 @@ def test_a_wrong_table_is_refused(tmp_path: Path, text: str, message: str) -> No
 
 
 def test_a_table_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="cannot be read"):
+    with pytest.raises(ConfigurationError, match=r"none\.csv"):
         read_table(tmp_path / "none.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigurationError, match="cannot be read"):
+    with pytest.raises(ConfigurationError, match=r"binary\.csv"):
         read_table(tmp_path / "binary.csv")
 
 
