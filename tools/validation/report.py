@@ -8,8 +8,8 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from pneuarm.service.validation.command import parameters_text, table1_report, table_cells
 from pneuarm.service.validation.table1 import read_table
-from pneuarm.service.validation.table1_report import parameters_text, table1_report, table_cells
 from tools.validation import figures_kinematics, figures_workspace
 from tools.validation.finite_elements import report as finite_elements
 from tools.validation.markdown import markdown_table

@@ -11,7 +11,7 @@ from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
 from pneuarm.controllers.kinematics.models.cosserat_rod import CosseratRod, RodProperties
 from pneuarm.service.validation.gravity import cross_validate, fit_rows, hanging_tip
-from pneuarm.service.validation.table1 import BAR, COLUMNS, Table, identify, read_table
+from pneuarm.service.validation.table1 import BAR, COLUMNS, PrintedTable, identify, read_table
 
 SHARED = (
     "pressure_bar,y_measured_mm,z_measured_mm,y_cc_mm,z_cc_mm,error_y_percent,error_z_percent\n"
@@ -21,11 +21,11 @@ SHARED = (
 )
 
 
-def computed_mm(table: Table) -> np.ndarray:
+def computed_mm(table: PrintedTable) -> np.ndarray:
     return 1e3 * identify(table).tip_m(table.column("pressure_bar", BAR))
 
 
-def printed_mm(table: Table) -> np.ndarray:
+def printed_mm(table: PrintedTable) -> np.ndarray:
     return np.stack([table.column("y_cc_mm"), table.column("z_cc_mm")], axis=-1)
 
 
@@ -67,7 +67,7 @@ def test_from_the_tables_own_millimetres_its_percentages_follow_exactly(axis: st
 def test_percentages_are_cut_not_rounded() -> None:
     printed = dict(read_table().printed)
     printed["error_y_percent"] = (Decimal("1.00"), Decimal("1.000"), Decimal("1"))
-    assert [str(value) for value in Table(printed).cut_errors_percent("y")] == [
+    assert [str(value) for value in PrintedTable(printed).cut_errors_percent("y")] == [
         "9.91",  # 9.9138
         "9.677",  # 9.6774
         "12",  # 12.80
@@ -89,8 +89,8 @@ def test_the_fit_on_two_rows_does_not_see_the_third() -> None:
     spoilt["y_measured_mm"] = (Decimal("20.9"), Decimal("33.6"), Decimal("99"))
     spoilt["z_measured_mm"] = (Decimal("178.2"), Decimal("179.9"), Decimal("9"))
     arm = identify(table)
-    assert identify(Table(spoilt)) == arm
-    assert fit_rows(Table(spoilt), arm, [0, 1]) == fit_rows(table, arm, [0, 1])
+    assert identify(PrintedTable(spoilt)) == arm
+    assert fit_rows(PrintedTable(spoilt), arm, [0, 1]) == fit_rows(table, arm, [0, 1])
 
 
 def test_without_weight_the_elastica_is_an_arc() -> None:
