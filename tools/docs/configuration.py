@@ -1,14 +1,13 @@
 """Tables of the configuration's keys, from the models that read them."""
 
 from collections.abc import Iterator
-from importlib.resources import files
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, get_args, get_origin
 
-from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pneuarm.service.configuration.configuration import PRESETS, Configuration, load
+from pneuarm.service.configuration.configuration import Configuration, load
+from tools.docs.kinds import as_toml, in_words
 from tools.docs.regions import NoSuchTable, linked, table
 
 HEADING = ("key", "unit", "default", "allowed", "meaning")
@@ -40,9 +39,6 @@ UNITS = {
     "kg": "kg",
     "s": "s",
 }
-
-#: What a number without bounds may be.
-_ANY = "finite number"
 
 Model = type[BaseModel]
 
@@ -82,7 +78,7 @@ def title(path: str) -> str:
     steps, model, several = path.split("."), Configuration, False
     for step in steps:
         field = model.model_fields[step]
-        several = several or get_origin(field.annotation) is tuple
+        several = several or get_origin(field.annotation) in (tuple, list)
         model = next(_models_in(field.annotation))  # type: ignore[assignment]
     return f"[[{path}]]" if several else f"[{path}]"
 
@@ -138,7 +134,8 @@ def _unit(key: str) -> str:
 
 def _default(path: str, field: FieldInfo) -> str:
     if not field.is_required():
-        return "" if isinstance(field.default, BaseModel) else _toml(field.default)
+        value = field.get_default(call_default_factory=True)
+        return "" if isinstance(value, BaseModel) else as_toml(value)
     return "from the built-in arm" if _given(path) else "required"
 
 
@@ -148,17 +145,6 @@ def _given(path: str) -> bool:
     for step in path.split(".") if path else ():
         value = getattr(value, step, None)
     return isinstance(value, BaseModel)
-
-
-def _toml(value: object) -> str:
-    """Return a value as a file has it."""
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def _meaning(path: str, key: str, field: FieldInfo) -> str:
@@ -174,102 +160,4 @@ def _allowed(path: str, key: str, field: FieldInfo) -> str:
     if models and f"{path}.{key}".lstrip(".") not in tables():
         top = next(name for name, model in tables().items() if model is models[0])
         return linked(f"a table like `{title(top)}`")
-    return _of(field.annotation, list(field.metadata))
-
-
-def _of(annotation: Any, bounds: list[Any]) -> str:
-    """Return in words what a type with its bounds takes."""
-    if hasattr(annotation, "__metadata__"):
-        inner = [part for item in annotation.__metadata__ for part in _metadata(item)]
-        return _of(annotation.__origin__, [*inner, *bounds])
-    if get_origin(annotation) is Literal:
-        return ", ".join(_toml(value) for value in get_args(annotation))
-    arguments = [part for part in get_args(annotation) if part is not type(None)]
-    if get_origin(annotation) is tuple:
-        return _list(arguments, bounds)
-    if arguments:  # X | None
-        return _of(arguments[0], bounds)
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return "a table"
-    if annotation is bool:
-        return "true, false"
-    if annotation is str:
-        return _text(bounds)
-    return _range(bounds) + (", whole" if annotation is int else "")
-
-
-def _metadata(item: Any) -> list[Any]:
-    return list(item.metadata) if isinstance(item, FieldInfo) else [item]
-
-
-def _list(items: list[Any], bounds: list[Any]) -> str:
-    each = _of(items[0], [])
-    if Ellipsis not in items:
-        return f"{len(items)} {each}s" if each == _ANY else f"{len(items)} rows of {each}"
-    least = next((bound.min_length for bound in bounds if isinstance(bound, MinLen)), 0)
-    most = next((bound.max_length for bound in bounds if isinstance(bound, MaxLen)), None)
-    many = f"{least} to {most}" if least and most else f"{least} or more"
-    many = f"up to {most}" if most and not least else many
-    return f"{many} entries" if each == "a table" else f"a list of {many}, each {each}"
-
-
-def _text(bounds: list[Any]) -> str:
-    most = next((bound.max_length for bound in bounds if isinstance(bound, MaxLen)), None)
-    return "text" if most is None else f"text of at most {most} characters"
-
-
-def _range(bounds: list[Any]) -> str:
-    low, high = "", ""
-    for bound in bounds:
-        if isinstance(bound, Ge):
-            low = f"{bound.ge:.10g}"
-        elif isinstance(bound, Gt):
-            low = f"above {bound.gt:.10g}"
-        elif isinstance(bound, Le):
-            high = f"{bound.le:.10g}"
-        elif isinstance(bound, Lt):
-            high = f"below {bound.lt:.10g}"
-    if not high:
-        return low if "above" in low else f"{low} or more" if low else _ANY
-    if "below" in high:
-        return f"{low} or more, {high}"
-    return f"{low}, to {high}" if "above" in low else f"{low} to {high}"
-
-
-#: Keys of a section that the built-in arms are told apart by.
-_COMPARED = (
-    "rest_length_mm",
-    "chamber_offset_mm",
-    "length_min_mm",
-    "length_max_mm",
-    "bend_max_deg",
-    "length_rate_max_mm_s",
-    "length_acceleration_max_mm_s2",
-    "pressure_min_bar",
-    "pressure_max_bar",
-    "pressure_slew_max_bar_s",
-    "lengthening_mm_per_bar",
-    "softening_mm_per_bar2",
-)
-
-
-def make_presets(name: str) -> str:
-    """Return the built-in arms side by side; several values where the sections differ."""
-    arms = [load(preset=preset) for preset in PRESETS]
-    rows = [["what it is", *(_first_comment(preset) for preset in PRESETS)]]
-    rows += [["sections", *(f"{len(arm.arm.sections)}" for arm in arms)]]
-    rows += [["`rate_hz`", *(f"{arm.control.rate_hz:g}" for arm in arms)]]
-    for key in _COMPARED:
-        values = [
-            ", ".join(dict.fromkeys(f"{getattr(part, key):g}" for part in arm.arm.sections))
-            for arm in arms
-        ]
-        rows.append([f"`{key}`", *values])
-    return table(["", *(f"`{preset}`" for preset in PRESETS)], rows)
-
-
-def _first_comment(preset: str) -> str:
-    """Return what a built-in arm's file says of itself at its head."""
-    text = files("pneuarm.service.configuration").joinpath("presets", f"{preset}.toml").read_text()
-    head = text.partition("\n\n")[0]
-    return " ".join(line.removeprefix("#").strip() for line in head.splitlines())
+    return in_words(field.annotation, list(field.metadata))

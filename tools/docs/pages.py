@@ -12,7 +12,7 @@ PAGES = tuple(sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]))
 #: What makes a table, by the first word of its name.
 MAKERS: dict[str, Callable[[str], str]] = {
     "configuration": configuration.make,
-    "presets": configuration.make_presets,
+    "presets": tables.make_presets,
     "keys": messages.make_topics,
     "enums": messages.make_enums,
     "message": messages.make_message,

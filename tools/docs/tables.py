@@ -1,11 +1,13 @@
-"""The tables of the mode machine, of faults, of exceptions and of the simulated arm."""
+"""The tables of modes, faults, exceptions, rooms, and of the built-in and the simulated arms."""
 
 import ast
 from dataclasses import fields
+from importlib.resources import files
 from pathlib import Path
 
 from pneuarm.controllers.arm import errors
 from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.service.configuration.configuration import PRESETS, load
 from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
 from pneuarm.service.safety.faults import FAULTS, FaultCode
 from tools.docs.regions import linked, table
@@ -77,3 +79,42 @@ def make_rooms(name: str) -> str:
 
 def _docstring(path: Path) -> str:
     return ast.get_docstring(ast.parse(path.read_text())) or ""
+
+
+#: Keys of a section that the built-in arms are told apart by.
+_COMPARED = (
+    "rest_length_mm",
+    "chamber_offset_mm",
+    "length_min_mm",
+    "length_max_mm",
+    "bend_max_deg",
+    "length_rate_max_mm_s",
+    "length_acceleration_max_mm_s2",
+    "pressure_min_bar",
+    "pressure_max_bar",
+    "pressure_slew_max_bar_s",
+    "lengthening_mm_per_bar",
+    "softening_mm_per_bar2",
+)
+
+
+def make_presets(name: str) -> str:
+    """Return the built-in arms side by side; several values where the sections differ."""
+    arms = [load(preset=preset) for preset in PRESETS]
+    rows = [["what it is", *(_first_comment(preset) for preset in PRESETS)]]
+    rows += [["sections", *(f"{len(arm.arm.sections)}" for arm in arms)]]
+    rows += [["`rate_hz`", *(f"{arm.control.rate_hz:g}" for arm in arms)]]
+    for key in _COMPARED:
+        values = [
+            ", ".join(dict.fromkeys(f"{getattr(part, key):g}" for part in arm.arm.sections))
+            for arm in arms
+        ]
+        rows.append([f"`{key}`", *values])
+    return table(["", *(f"`{preset}`" for preset in PRESETS)], rows)
+
+
+def _first_comment(preset: str) -> str:
+    """Return what a built-in arm's file says of itself at its head."""
+    text = files("pneuarm.service.configuration").joinpath("presets", f"{preset}.toml").read_text()
+    head = text.partition("\n\n")[0]
+    return " ".join(line.removeprefix("#").strip() for line in head.splitlines())

@@ -47,6 +47,7 @@ def test_pages_and_tables_become_links() -> None:
         (Annotated[float, Field(ge=0, lt=3)], 1.0, ["1.0", "0 or more, below 3"]),
         (Annotated[int, Field(ge=1, le=98)], 80, ["80", "1 to 98, whole"]),
         (Annotated[Positive, Field(le=7)], 2.0, ["2.0", "above 0, to 7"]),
+        (Annotated[float, Field(le=7)], 2.0, ["2.0", "at most 7"]),
         (Literal["a", "b"], "a", ['"a"', '"a", "b"']),
         (bool, True, ["true", "true, false"]),
         (Finite | None, None, ["none", "finite number"]),
