@@ -121,8 +121,9 @@ def write_document(directory: Path, sections: tuple[Section, ...] = SECTIONS) ->
 
 
 def draw_pictures(directory: Path) -> None:
-    """Draw the picture of the models into ``directory``."""
+    """Draw the pictures of the workspaces and of the models into ``directory``."""
     directory.mkdir(parents=True, exist_ok=True)
+    figures_workspace.draw(directory)
     draw(paper_arm(), table1_weight_over_bending_per_m3(), directory / _MODELS_PICTURE)
 
 
