@@ -22,7 +22,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 """
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(500)
 def test_both_installed_run_the_demo_and_read_its_log(
     wheels: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -32,7 +32,7 @@ def test_both_installed_run_the_demo_and_read_its_log(
         [programs / "pneuarm", "demo", "--seconds", "5", "--json"],
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=300,
         **place,  # type: ignore[call-overload]
     )
     assert demo.returncode == 0, (demo.stdout, demo.stderr)
