@@ -1,30 +1,19 @@
 """Tables of messages, enums and keys, from the comments of the .proto and the table of topics."""
 
-import tempfile
+import re
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
-from google.protobuf.descriptor import FieldDescriptor
-from google.protobuf.descriptor_pb2 import (
-    DescriptorProto,
-    FieldDescriptorProto,
-    FileDescriptorProto,
-    FileDescriptorSet,
-)
-from grpc_tools import protoc
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
 from pneuarm.logs.rings.tick import tick_dtype
+from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import TOPICS, Topic
 from pneuarm.service.modes.mode import ModeEvent
 from pneuarm.service.safety.faults import FaultCode
 from tools.docs.regions import NoSuchTable, linked, table
 
-ROOT = Path(__file__).resolve().parents[2]
-PROTO = "pneuarm/logs/schema/pneuarm.proto"
-
-#: Where protoc finds the messages of its own, as its command line does by itself.
-_GOOGLE = files("grpc_tools").joinpath("_proto")
+PROTO = Path(__file__).resolve().parents[2] / "logs" / "schema" / "pneuarm.proto"
 
 #: Unit of a field by the end of its name, the longest first.
 UNITS = {
@@ -40,9 +29,6 @@ UNITS = {
     "s": "s",
 }
 
-#: Where in a file its messages, their fields, its enums and their values stand: descriptor.proto.
-_MESSAGES, _FIELDS, _ENUMS, _VALUES = 4, 2, 5, 2
-
 _DIRECTIONS = {
     "in": "put, to the daemon",
     "out": "published",
@@ -50,109 +36,102 @@ _DIRECTIONS = {
     "file": "in the log only",
 }
 
-
-@cache
-def _file() -> FileDescriptorProto:
-    """Read the .proto with its comments; the generated classes have none."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "set"
-        arguments = ["protoc", f"-I{ROOT}", f"-I{_GOOGLE}", f"--descriptor_set_out={path}"]
-        if protoc.main([*arguments, "--include_source_info", PROTO]):
-            raise RuntimeError(f"protoc does not read {PROTO}: see above")
-        return FileDescriptorSet.FromString(path.read_bytes()).file[0]
+_BLOCK = re.compile(r"(?:message|enum) (\w+)")
+_MEMBER = re.compile(r"(\w+) = \d+")
 
 
 @cache
-def _comments() -> dict[tuple[int, ...], str]:
-    """Return every comment by the path of what it stands at: before it, or behind it."""
-    return {
-        tuple(place.path): " ".join(f"{place.leading_comments} {place.trailing_comments}".split())
-        for place in _file().source_code_info.location
-    }
+def comments() -> dict[str, str]:
+    """Return the comments of the .proto by `Message`, `Message.field` and `Enum.VALUE`.
+
+    One stands before its line or behind it; the generated classes have none.
+    """
+    found: dict[str, str] = {}
+    block, before = "", []
+    for line in PROTO.read_text().splitlines():
+        code, _, behind = line.partition("//")
+        if behind and not code.strip():
+            before.append(behind.strip())
+            continue
+        if begins := _BLOCK.match(code):
+            block = begins[1]
+            found[block] = " ".join([*before, behind.strip()]).strip()
+        elif member := _MEMBER.search(code):
+            found[f"{block}.{member[1]}"] = " ".join([*before, behind.strip()]).strip()
+        before = []
+    return found
 
 
-def messages() -> dict[str, DescriptorProto]:
+def messages() -> dict[str, Descriptor]:
     """All messages of the .proto by their names."""
-    return {message.name: message for message in _file().message_type}
+    return dict(pb.DESCRIPTOR.message_types_by_name)
 
 
 def make_message(name: str) -> str:
     """Return what is said of a message, and the table of its fields."""
-    wanted = name.removeprefix("message").strip()
-    if wanted not in messages():
-        raise NoSuchTable(f"{PROTO} has no message {wanted!r}")
-    number = list(messages()).index(wanted)
-    told = _comments().get((_MESSAGES, number), "")
+    message = messages().get(name.removeprefix("message").strip())
+    if message is None:
+        raise NoSuchTable(f"{PROTO.name} has no {name}")
     rows = [
-        [f"`{field.name}`", _type(wanted, field), _meaning(messages()[wanted], index)]
-        for index, field in enumerate(messages()[wanted].field)
+        [f"`{field.name}`", _type(field), _meaning(message.name, field)] for field in message.fields
     ]
-    parts = [linked(told), table(("field", "type, unit", "meaning"), rows) if rows else ""]
+    heading = ("field", "type, unit", "meaning")
+    parts = [linked(comments()[message.name]), table(heading, rows) if rows else ""]
     return "\n\n".join(part for part in parts if part)
 
 
-def comment_of(message: str, index: int) -> str:
-    """Return the comment of a field."""
-    place = (_MESSAGES, list(messages()).index(message), _FIELDS, index)
-    return linked(_comments().get(place, ""))
-
-
-def _meaning(message: DescriptorProto, index: int) -> str:
-    field = message.field[index]
-    told = comment_of(message.name, index)
-    if not field.HasField("oneof_index"):
+def _meaning(message: str, field: FieldDescriptor) -> str:
+    told = linked(comments()[f"{message}.{field.name}"])
+    choice = field.containing_oneof
+    if choice is None or field is not choice.fields[0]:
         return told
-    together = [other for other in message.field if other.HasField("oneof_index")]
-    if field is not together[0]:
-        return told
-    return "; ".join(part for part in (f"exactly one of these {len(together)}", told) if part)
+    return "; ".join(part for part in (f"exactly one of these {len(choice.fields)}", told) if part)
 
 
-def _type(message: str, field: FieldDescriptorProto) -> str:
-    entry = _map_value(field)
-    if entry is not None:
-        return f"map to {_plain(entry)}"
+def _type(field: FieldDescriptor) -> str:
+    message = field.message_type
+    if message is not None and message.GetOptions().map_entry:
+        return f"map to {_plain(message.fields_by_name['value'])}"
     unit = next((unit for end, unit in UNITS.items() if field.name.endswith(f"_{end}")), "")
     is_word = field.type in (FieldDescriptor.TYPE_STRING, FieldDescriptor.TYPE_BYTES)
-    return _many(message, field) + (f", {unit}" if unit and not is_word else "")
+    return _many(field) + (f", {unit}" if unit and not is_word else "")
 
 
-def _many(message: str, field: FieldDescriptorProto) -> str:
+def _many(field: FieldDescriptor) -> str:
     """Return the type, and of an array how many there are: a vector's, or one a chamber."""
-    if field.label != FieldDescriptor.LABEL_REPEATED:
+    if not field.is_repeated:
         return _plain(field)
-    shape = tick_dtype(1)[field.name].shape if message == "ArmState" else ()
+    in_tick = field.containing_type is pb.ArmState.DESCRIPTOR
+    shape = tick_dtype(1)[field.name].shape if in_tick else ()
     return f"{shape[0]} {_plain(field)}" if len(shape) == 1 else f"{_plain(field)} each"
 
 
-def _map_value(field: FieldDescriptorProto) -> FieldDescriptorProto | None:
-    """Return the values' field where a field is a map."""
-    for message in _file().message_type:
-        for nested in message.nested_type:
-            if nested.options.map_entry and field.type_name.endswith(f".{nested.name}"):
-                return nested.field[1]
-    return None
+#: Names of the types as the .proto has them.
+_TYPES = {
+    value: name.removeprefix("TYPE_").lower()
+    for name, value in vars(FieldDescriptor).items()
+    if name.startswith("TYPE_")
+}
 
 
-def _plain(field: FieldDescriptorProto) -> str:
+def _plain(field: FieldDescriptor) -> str:
     """Return a field's type; messages are links to what is said of them."""
-    name = field.type_name.rpartition(".")[2]
-    if field.type == FieldDescriptor.TYPE_MESSAGE:
-        return f"[`{name}`](#{name.lower()})"
-    if field.type == FieldDescriptor.TYPE_ENUM:
-        return f"`{name}`"
-    return FieldDescriptorProto.Type.Name(field.type).removeprefix("TYPE_").lower()
+    if field.message_type is not None:
+        return f"[`{field.message_type.name}`](#{field.message_type.name.lower()})"
+    if field.enum_type is not None:
+        return f"`{field.enum_type.name}`"
+    return _TYPES[field.type]
 
 
 def make_enums(name: str) -> str:
     """Return all enums, each value with its number and its comment."""
     rows = []
-    for number, enum in enumerate(_file().enum_type):
+    for enum in pb.DESCRIPTOR.enum_types_by_name.values():
         values = []
-        for index, value in enumerate(enum.value):
-            told = _comments().get((_ENUMS, number, _VALUES, index), "")
+        for value in enum.values:
+            told = comments()[f"{enum.name}.{value.name}"]
             values.append(f"{value.number} `{value.name}`" + (f" ({told})" if told else ""))
-        rows.append([f"`{enum.name}`", ", ".join(values), _comments().get((_ENUMS, number), "")])
+        rows.append([f"`{enum.name}`", ", ".join(values), comments()[enum.name]])
     return table(("enum", "values", "meaning"), rows)
 
 

@@ -70,7 +70,7 @@ def test_default_and_bounds_are_told_of_every_kind_of_key(
 def test_every_message_of_the_wire_is_told_with_all_its_fields() -> None:
     for name, message in messages.messages().items():
         told = messages.make_message(f"message {name}")
-        for field in message.field:
+        for field in message.fields:
             assert f"| `{field.name}` |" in told
 
 
