@@ -1,5 +1,6 @@
 """The documents against the code: keys and fields are described, references resolve."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -9,20 +10,20 @@ from google.protobuf.descriptor import Descriptor
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from pneuarm.hardware.device import Device, EmulatedDevice
 from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.hardware.tables import arm
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from pneuarm.service.configuration import configuration as config
+from pneuarm.service.configuration.devices import AnyDevice, devices
 from pneuarm.service.configuration.tables import (
-    arm,
     control,
     feedback,
-    festo,
     frames,
     hardware,
     monitors,
     outputs,
-    serial,
 )
 from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
 
@@ -43,12 +44,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "`[frames]`": frames.FramesConfig,
     "`[hardware]`": hardware.HardwareConfig,
     "`[monitors]`": monitors.MonitorsConfig,
-    "`[simulator]`": hardware.SimulatorConfig,
-    "`[festo_cpx]`": festo.FestoCpxConfig,
-    "`[festo_vtem]`": festo.FestoVtemConfig,
-    "`[ctrl_p]`": serial.CtrlPConfig,
-    "`[esp32]`": serial.Esp32Config,
-    "`[replay]`": serial.ReplayConfig,
+    **{f"`[{device.table}]`": device.config for device in devices().usable.values()},
     "`[zenoh]`": outputs.ZenohConfig,
     "`[rerun]`": outputs.RerunConfig,
     "`[log]`": outputs.LogConfig,
@@ -133,6 +129,33 @@ def test_every_key_is_described_with_its_default_and_bounds(heading: str, key: s
 @pytest.mark.parametrize("heading", TABLES)
 def test_no_key_is_described_that_does_not_exist(heading: str) -> None:
     assert set(rows(section("configuration.md", heading))) == set(TABLES[heading].model_fields)
+
+
+@pytest.mark.parametrize("device", devices().usable.values(), ids=lambda device: device.name)
+def test_what_every_device_leaves_in_the_arm_is_described(device: AnyDevice) -> None:
+    watchdog = rows(section("hardware.md", "Which device has a watchdog"))[device.name][1]
+    assert (watchdog == "no") == bool(device.left_behind(device.config()))
+
+
+def test_every_member_of_a_kind_of_device_is_described() -> None:
+    described = " ".join(rows(section("hardware.md", "Write your own adapter")))
+    members = [name for name in {**vars(Device), **vars(EmulatedDevice)} if name[0] != "_"]
+    left_alone = {"table", "never_waits"}  # follows from the name; of what is in memory only
+    own = {"name", "summary", "config", *members} - left_alone
+    assert [name for name in sorted(own) if name not in described] == []
+
+
+def test_the_test_of_a_device_of_your_own_is_the_examples() -> None:
+    (block,) = code_blocks("hardware.md", "python")
+    example = ast.parse((ROOT / "examples/device/tests/test_contract.py").read_text())
+    for node in ast.walk(example):
+        if isinstance(node, ast.ClassDef | ast.Module):
+            node.body = [part for part in node.body if not _is_docstring(part)]
+    assert ast.dump(ast.parse(block)) == ast.dump(example)
+
+
+def _is_docstring(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 @pytest.mark.parametrize("preset", config.PRESETS)

@@ -20,9 +20,6 @@ class ReplayDevice:
     It satisfies :class:`pneuarm.hardware.interface.Hardware`. What is written goes nowhere.
     """
 
-    #: There is no air behind it.
-    has_watchdog = True
-
     def __init__(self, arm: Arm, path: Path) -> None:
         """Raise ConfigurationError for a log that is none, or of an arm with other sections."""
         self._arm, self._path = arm, path

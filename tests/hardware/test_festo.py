@@ -36,8 +36,9 @@ from pneuarm.hardware.transports.modbus import (
     runs,
     to_signed,
 )
-from tests.hardware.contract import ARMS
-from tests.hardware.festo_bench import WATCHDOG, Served, cpx_settings, vtem_settings
+from pneuarm.hardware.transports.modbus_server import ServedTerminal
+from tests.hardware.arms import ARMS
+from tests.hardware.festo_bench import WATCHDOG, cpx_settings, vtem_settings
 
 PAPER = ARMS["paper"]
 LAYOUT = CpxLayout((0, 1, 2))
@@ -98,9 +99,9 @@ def test_the_words_of_a_vtem_are_those_of_the_public_driver() -> None:
 @contextmanager
 def cpx(
     watchdog: TerminalWatchdog = WATCHDOG, hold: bool = False
-) -> Iterator[tuple[FestoCpx, Served, EmulatedArm]]:
+) -> Iterator[tuple[FestoCpx, ServedTerminal, EmulatedArm]]:
     arm = EmulatedArm(PAPER, 0)
-    with Served(EmulatedCpx(arm, LAYOUT, watchdog, hold)) as served:
+    with ServedTerminal(EmulatedCpx(arm, LAYOUT, watchdog, hold)) as served:
         adapter = FestoCpx(PAPER, cpx_settings(served.port, LAYOUT, watchdog))
         yield adapter, served, arm
         adapter.close()
@@ -164,7 +165,7 @@ def vtem() -> Iterator[tuple[FestoVtem, EmulatedVtem, list[float]]]:
         time.sleep(0.1 * seconds)
 
     terminal = EmulatedVtem(EmulatedArm(PAPER, 0), layout, WATCHDOG)
-    with Served(terminal) as served:
+    with ServedTerminal(terminal) as served:
         adapter = FestoVtem(PAPER, vtem_settings(served.port, layout), sleep)
         yield adapter, terminal, slept
         adapter.close()

@@ -19,7 +19,7 @@ from pneuarm.hardware.esp32.emulator import Esp32Emulator
 from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.hardware.transports.pseudo_terminal import PseudoTerminal, SerialEmulator
 from pneuarm.hardware.transports.serial_faults import SerialFaults
-from tests.hardware.contract import ARMS
+from tests.hardware.arms import ARMS
 from tools.rig.daemon import wait_for
 
 PAPER = ARMS["paper"]

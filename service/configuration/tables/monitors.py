@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pneuarm.service.configuration.tables.table import BAR, MM, Positive, Table
+from pneuarm.hardware.tables.table import BAR, MM, Positive, Table
 from pneuarm.service.safety.monitors.settings import MonitorSettings
 
 MS = 1e-3

@@ -24,6 +24,7 @@ from pneuarm.service.configuration.configuration import (
     log_directory,
     rerun_url,
 )
+from pneuarm.service.devices import registry
 
 SECTION = load().model_dump()["arm"]["sections"][0]
 
@@ -125,7 +126,7 @@ def test_an_unknown_key_of_a_section_too(tmp_path: Path) -> None:
         ("[rerun]\nenabled = 1", "rerun.enabled = 1: input should be a valid boolean"),
         ("[zenoh]\nlisten = ['localhost']", "zenoh.listen[0] = 'localhost': string should match"),
         ("control = 3", "control = 3: input should be"),
-        ("[hardware]\nadapter = 'festo'", "hardware.adapter = 'festo': input should be 'sim"),
+        ("[hardware]\nadapter = 'festo'", "hardware.adapter = 'festo': no device is called"),
         ("[log]\nroll_mib = inf", "log.roll_mib = inf: input should be a finite number"),
         ("[log]\nkeep_gib = nan", "log.keep_gib = nan: input should be"),
         ("[rerun]\nport = 70000", "rerun.port = 70000: input should be less than or equal to"),
@@ -216,9 +217,9 @@ def test_a_configuration_is_never_changed() -> None:
 
 def test_addresses(tmp_path: Path) -> None:
     one = load()
-    assert one.device_address == "simulator:paper"
+    assert registry.address(one) == "simulator:paper"
     two = loaded(tmp_path, "[hardware]\ndevice = 'bench'\n[rerun]\nbind = '0.0.0.0'\nport = 99\n")
-    assert two.device_address == "simulator:bench"
+    assert registry.address(two) == "simulator:bench"
     assert rerun_url(one) == "rerun+http://127.0.0.1:9876/proxy"
     assert rerun_url(two) == "rerun+http://127.0.0.1:99/proxy"
     assert log_directory(loaded(tmp_path, "[log]\ndirectory = '~/x'")) == Path.home() / "x"
