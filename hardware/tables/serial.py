@@ -10,7 +10,7 @@ from pneuarm.hardware.tables.table import Table
 
 
 class SerialConfig(Table):
-    """Where a serial device is, and how long it may be silent."""
+    """Where a serial device is, and how fast its line is."""
 
     device: Annotated[
         str,

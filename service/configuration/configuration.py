@@ -35,7 +35,6 @@ from pneuarm.service.configuration.tables.outputs import LogConfig, RerunConfig,
 
 PRESETS = ("paper", "table1", "trunk")
 
-
 DeviceConfig = TypeVar("DeviceConfig", bound=Table)
 
 
@@ -101,7 +100,7 @@ class _Configuration(Table):
 
 
 # The simulated arm stands behind every emulator, so its table is one of ours.
-devices().set_aside(_Configuration.model_fields.keys() - {SIMULATOR.table})
+devices().set_aside({*_Configuration.model_fields, *dir(_Configuration)} - {SIMULATOR.table})
 
 if TYPE_CHECKING:
     Configuration = _Configuration

@@ -58,12 +58,12 @@ class Devices:
             raise ConfigurationError(str(self.broken[name]))
         raise ConfigurationError(f"no device is called {name!r}; allowed: {', '.join(self.usable)}")
 
-    def set_aside(self, tables: Set[str]) -> None:
-        """Count those of other packages as broken whose table would hide one of ``tables``."""
+    def set_aside(self, taken: Set[str]) -> None:
+        """Count those of other packages as broken whose table has a name that is ``taken``."""
         for name, device in list(self.usable.items()):
-            if device.table in tables:
+            if device.table in taken:
                 package = type(device).__module__.partition(".")[0]
-                reason = f"[{device.table}] is a table of pneuarm's own: choose another name"
+                reason = f"[{device.table}] is taken by pneuarm itself: choose another name"
                 self.broken[name] = BrokenDevice(name, package, reason)
                 del self.usable[name]
 
@@ -107,8 +107,10 @@ def _checked(found: object, point: EntryPoint, others: dict[str, AnyDevice]) -> 
         raise ValueError(f"{point.value} calls itself {found.name!r}: both names must be the same")
     if found.table in {other.table for other in others.values()}:
         raise ValueError("another device has this name")
-    if not issubclass(found.config, Table):
+    if not (isinstance(found.config, type) and issubclass(found.config, Table)):
         raise TypeError(f"its config {found.config!r} is no class made of pneuarm's Table")
+    if not isinstance(found.summary, str):
+        raise TypeError(f"its summary {found.summary!r} is no text")
     try:
         found.config()
     except ValidationError as error:

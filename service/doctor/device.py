@@ -19,6 +19,8 @@ _PATIENCE_S = 1.0
 def reachable(configuration: Configuration) -> Finding:
     """Look for the configured device: a file for a serial line, a connection for the network."""
     match backends.location(configuration):
+        case SerialPort("") | TcpPort(""):
+            return Finding(_NAME, Verdict.INFO, "nobody has said where it is")
         case SerialPort(path):
             return serial(path)
         case TcpPort(host, port):

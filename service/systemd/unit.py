@@ -36,7 +36,7 @@ def unit_text(configuration: Configuration, path: Path | None, user: str) -> str
     command = [sys.executable, "-m", "pneuarm", "run", *what]
     own: list[str] = []
     where = backends.location(configuration)
-    if isinstance(where, SerialPort):
+    if isinstance(where, SerialPort) and where.path:
         own = [f"DeviceAllow={_escaped(where.path)} rw"]
         own.append(f"SupplementaryGroups={_group(where.path)}")
     if configuration.log.directory:

@@ -31,6 +31,8 @@ from pneuarm.hardware.festo_vtem.protocol import (
     app_and_state,
 )
 from pneuarm.hardware.transports.modbus import (
+    ModbusRefusal,
+    ModbusTerminal,
     from_signed,
     milliseconds_to_registers,
     runs,
@@ -116,7 +118,7 @@ def test_a_setpoint_of_somebody_else_is_a_fault() -> None:
         other.connect()
         ours.read(0.0)
         ours.read(0.0)  # it may only be late
-        with pytest.raises(HardwareError, match=r"valve 0 holds the setpoint 0 mbar, but 200"):
+        with pytest.raises(HardwareError, match=r"valve 0 .*\b0 mbar.*\b200 mbar"):
             ours.read(0.0)
         other.close()
 
@@ -132,7 +134,10 @@ def test_a_setpoint_that_shows_late_is_none() -> None:
 
 def test_a_terminal_that_would_trap_the_air_is_refused_where_it_shows_it() -> None:
     shown = TerminalWatchdog(46100, 1, 200, failsafe_register=46101)
-    with cpx(shown, hold=True) as (ours, _, _), pytest.raises(HardwareError, match="hold last"):
+    with (
+        cpx(shown, hold=True) as (ours, _, _),
+        pytest.raises(HardwareError, match=r"festo_cpx.* 1 .*46101"),
+    ):
         ours.connect()
     with cpx(shown) as (ours, _, _):
         ours.connect()
@@ -189,9 +194,25 @@ def test_a_slot_that_stops_or_never_starts_is_named() -> None:
     with vtem() as (adapter, terminal, _):
         adapter.connect()
         terminal._slots[1].app = 5
-        with pytest.raises(HardwareError, match=r"slot 1 has left pressure regulation"):
+        with pytest.raises(HardwareError, match=r"slot 1 .*app 5"):
             adapter.read(0.0)
         adapter.close()
         terminal._slots[0].command = lambda *_: None  # type: ignore[method-assign]
-        with pytest.raises(HardwareError, match=r"slot 0 does not regulate pressure after 3 s"):
+        with pytest.raises(HardwareError, match=r"slot 0 .* 3 s"):
             adapter.connect()
+
+
+def test_only_a_missing_register_is_blamed_on_the_wiring() -> None:
+    arm = EmulatedArm(PAPER, 0)
+    with ServedTerminal(EmulatedCpx(arm, LAYOUT, WATCHDOG)) as served:
+        wrong = FestoCpx(PAPER, cpx_settings(served.port, CpxLayout((0, 1, 2), input_base=100)))
+        with pytest.raises(HardwareError, match=r"festo_cpx\.input_base = 100"):
+            wrong.connect()
+        terminal = ModbusTerminal("festo_cpx", "127.0.0.1", served.port, 1, 0.5)
+        terminal.connect()
+        served.inject("exception 1")
+        with pytest.raises(ModbusRefusal) as raised:
+            terminal.read_wired(LAYOUT.input_block, "three valves")
+        terminal.close()
+    assert raised.value.code == 6
+    assert "three valves" not in str(raised.value)

@@ -175,6 +175,12 @@ class Good(Device[ReplayConfig]):
         return ""
 
 
+class Nameless(Good):
+    """A device that does not say what it is."""
+
+    summary = None  # type: ignore[assignment]
+
+
 class NeedsAHost(Table):
     """A table that cannot be left out."""
 
@@ -192,6 +198,8 @@ class NeedsAHost(Table):
         ("box", Good("box", dict), "Table"),
         ("box", Good("box", NeedsAHost), "host"),
         ("zenoh", Good("zenoh"), "[zenoh]"),
+        ("device", Good("device"), "[device]"),
+        ("box", Nameless("box"), "summary"),
     ],
 )
 def test_a_device_that_cannot_stand_beside_the_others_is_set_aside(
@@ -200,7 +208,7 @@ def test_a_device_that_cannot_stand_beside_the_others_is_set_aside(
     points = [point(name, found), point("good", Good("good"))]
     monkeypatch.setattr(devices_module, "entry_points", lambda group: points)
     all_devices = devices_module.devices.__wrapped__()
-    all_devices.set_aside({"zenoh", "arm"})
+    all_devices.set_aside({"zenoh", "device"})
     assert set(all_devices.usable) == {*ALL, "good"}
     sentence = str(all_devices.broken[name])
     for told in (repr(name), fact):

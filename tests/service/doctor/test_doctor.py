@@ -16,6 +16,7 @@ from pneuarm.service.devices import registry
 from pneuarm.service.doctor import device, machine, places, rights, timing
 from pneuarm.service.doctor.command import examine
 from pneuarm.service.doctor.finding import Finding, Verdict, summary
+from pneuarm.service.systemd.unit import unit_text
 from tools.rig.daemon import ROOT, Daemon, free_port, run_command
 
 
@@ -174,6 +175,13 @@ def test_what_is_in_memory_is_reached_and_what_cannot_be_tried_is_told(
     told = device.reachable(load())
     assert told.verdict is Verdict.INFO
     assert "can0/12" in told.text
+
+
+@pytest.mark.parametrize("adapter", ["festo-cpx", "esp32"])
+def test_a_device_without_an_address_is_not_looked_for(adapter: str) -> None:
+    nowhere = configured(hardware={"adapter": adapter})
+    assert device.reachable(nowhere).verdict is Verdict.INFO
+    assert "DeviceAllow" not in unit_text(nowhere, None, "ada")
 
 
 def test_sessions_need_a_disk_with_room(tmp_path: Path) -> None:
