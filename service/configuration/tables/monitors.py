@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from pneuarm.hardware.tables.table import BAR, MM, Positive, Table
-from pneuarm.service.safety.monitors.settings import MonitorSettings
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 
 MS = 1e-3
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.arm.errors import AlreadyInUse, ConfigurationError
 from pneuarm.hardware.device import Bus, Device, EmulatedDevice, SerialPort, TcpPort
 from pneuarm.hardware.emulation.emulation import EmulatedArm
 from pneuarm.hardware.tables.table import Table
@@ -104,7 +104,7 @@ def test_a_second_daemon_on_a_device_is_refused_whatever_its_arm_is_called(name:
         tables[ALL[name].table] |= keys
         return config.check(tables)
 
-    refused = pytest.raises(ConfigurationError, match=str(os.getpid()))
+    refused = pytest.raises(AlreadyInUse, match=str(os.getpid()))
     with reachable(ALL[name]) as keys, lock("device", backends.address(named("one"))), refused:
         lock("device", backends.address(named("other")))
 
