@@ -42,7 +42,6 @@ class Watched:
     fail_read: Exception | None = None
     fail_write: Exception | None = None
     fail_vent: Exception | None = None
-    has_watchdog: bool = True
 
     def connect(self) -> None:
         self.device.connect()

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from pneuarm.hardware.tables.table import BAR, MM, Positive, Table
 from pneuarm.service.configuration.monitor_settings import MonitorSettings
-from pneuarm.service.configuration.tables.table import BAR, MM, Positive, Table
 
 MS = 1e-3
 
