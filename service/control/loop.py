@@ -19,6 +19,7 @@ from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.control.record import (
     Estimate,
     GuardCounts,
@@ -39,7 +40,6 @@ from pneuarm.service.processes.pipe import (
     SetTarget,
     SetTipPose,
 )
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 from pneuarm.service.safety.monitors.watch import measurement_age_s
 from pneuarm.service.safety.safety import Safety
 
