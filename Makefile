@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo faults test test-slow test-lowest check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults test test-slow test-lowest check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -44,7 +44,7 @@ check: setup
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
 # The finite elements are recorded; `python -m tools.validation.finite_elements` solves them anew.
 validate: bench-setup
-	$(BIN)/python -m pneuarm.service.validation.report --out docs
+	$(BIN)/python -m tools.validation.report --out docs
 
 # Every benchmark, one after another, on a machine that does nothing else; writes its table.
 bench: bench-setup
@@ -53,6 +53,10 @@ bench: bench-setup
 # The peers that the benchmarks compare with; nothing else needs them.
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
+
+# The tables of docs/ that stand in the code: keys, messages, faults, modes.
+docs: setup
+	$(BIN)/python -m tools.docs
 
 # Message classes run with their protoc's protobuf or a newer one: 5.29 is what the oldest
 # environments have that the client shall share, and what foxglove-schemas-protobuf was made with.

@@ -15,6 +15,9 @@ from pneuarm.service.processes.usage import ProcessTable
 
 _REVIVE_AFTER_S = 1.0
 
+#: How often somebody who ends a process looks how far it is.
+_LOOK_S = 0.5
+
 
 def enter(name: str, module: str, arguments: tuple[object, ...]) -> None:
     """Run a process's own `main`; this is what the new interpreter starts with."""
@@ -87,14 +90,22 @@ class Child:
         if self._process is not None:
             self._process.terminate()
 
-    def end(self, patience_s: float) -> bool:
-        """Ask it to end; kill it after the given time. Return whether it ended by itself."""
+    def end(self, patience_s: float, progress: Callable[[], object] = lambda: None) -> bool:
+        """Ask it to end; kill it after the given time. Return whether it ended by itself.
+
+        The time begins anew whenever ``progress``, which says how far it is, says something else.
+        """
         if self._end is not None:
             self._end.close()  # the child reads the end of this pipe as the word
-        if self.join(patience_s):
-            return True
-        self.kill()
-        return False
+        reached, since_s = progress(), time.monotonic()
+        while not self.join(min(_LOOK_S, patience_s)):
+            now, now_s = progress(), time.monotonic()
+            if now != reached:
+                reached, since_s = now, now_s
+            elif now_s - since_s > patience_s:
+                self.kill()
+                return False
+        return True
 
     def join(self, patience_s: float) -> bool:
         """Wait for its end; return whether it came."""
