@@ -111,7 +111,7 @@ class CameraRig:
             self._sequence += 1
             given.append(SetTarget(self._target, self._sequence, self.now_ns))
         record, _ = self.loop.tick(self.now_ns, given, Disk.OK, Timing())
-        self._records.append(bytes(record))
+        self._records.append(record)
         self._look()
 
     def activate(self) -> "CameraRig":
