@@ -126,7 +126,7 @@ class Motion:
         if law is None:
             safe.take(None)
         else:
-            compiled.builder.function.call()
+            compiled.builder.function.evaluate()
             safe.take(law.wish(compiled.builder.problem))
         self._lengths[:] = safe.moved_m
         self._rates[:] = safe.rates_m_s
@@ -134,5 +134,5 @@ class Motion:
     def problem(self, dt_s: float) -> IkProblem:
         """Build the QP of the next step, without making it."""
         self._dt[0] = dt_s
-        self._compiled.builder.function.call()
+        self._compiled.builder.function.evaluate()
         return self._compiled.builder.problem

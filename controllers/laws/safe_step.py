@@ -169,7 +169,7 @@ class SafeStep:
 
     def _allowed(self, share: float, floor: float) -> bool:
         self._share[0] = share
-        self.function.call()
+        self.function.evaluate()
         return bool(self._scalars[0] >= floor)  # never true of a NaN
 
     def _floor(self) -> float:

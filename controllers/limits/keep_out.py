@@ -44,7 +44,7 @@ class KeepOutLimit:
     def left_m(self, lengths_m: Array) -> Array:
         """Return the clearances at lengths (n_sections, 3), as in :meth:`slack`; reused arrays."""
         self._lengths[:] = lengths_m.reshape(-1)
-        self._compiled.call()
+        self._compiled.evaluate()
         return self._compiled.results[0]
 
 

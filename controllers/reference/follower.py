@@ -14,7 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array, Response
-from pneuarm.controllers.geometry.frames import rotation_from_vector, rotation_vector, spin_of
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+    rotation_vector,
+    spin_of,
+)
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.reference.stream import STREAM_S, Stream
 from pneuarm.controllers.reference.trajectory import (
@@ -25,7 +31,6 @@ from pneuarm.controllers.reference.trajectory import (
     standing,
 )
 from pneuarm.controllers.targets.targets import PoseTarget, PositionTarget, ShapeTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 
 #: One metre of the limits allows this many radians.
 _TURN_PER_M = 10.0

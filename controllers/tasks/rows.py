@@ -6,13 +6,11 @@ from typing import NamedTuple
 import casadi as ca
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.geometry.rotations import symbolic_angle_vector, symbolic_rotation_vector
 from pneuarm.controllers.kinematics.compiled import symbolic_tip
 from pneuarm.controllers.tasks.wanted import ORIENTATION_LENGTH_M
 
 Parts = Mapping[str, ca.SX]
-
-#: Sine of an angle (rad) below which the vector of a rotation needs no division.
-_SMALL = 1e-9
 
 
 class Rows(NamedTuple):
@@ -84,38 +82,12 @@ def _orientation_error(want: Parts, rotation: ca.SX) -> ca.SX:
     axis = rotation[:, 2]
     across, along = ca.cross(axis, want["direction"]), ca.dot(axis, want["direction"])
     # Exactly the other way round every axis across is as good: the tip's own x.
-    pointing = _angle_vector(across, along, rotation[:, 0])
+    pointing = symbolic_angle_vector(across, along, rotation[:, 0])
     whole = want["rotation"] @ rotation.T
     return (
         want["rotation_follows"] * symbolic_rotation_vector(whole)
         + want["direction_follows"] * pointing
     )
-
-
-def symbolic_rotation_vector(rotation: ca.SX) -> ca.SX:
-    """Axis times angle (3,), rad; angles up to pi."""
-    axial = 0.5 * ca.vertcat(
-        rotation[2, 1] - rotation[1, 2],
-        rotation[0, 2] - rotation[2, 0],
-        rotation[1, 0] - rotation[0, 1],
-    )
-    # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
-    first, second, third = (rotation[:, k] + ca.SX.eye(3)[:, k] for k in range(3))
-    column = ca.if_else(
-        ca.fmax(rotation[1, 1], rotation[2, 2]) < rotation[0, 0],
-        first,
-        ca.if_else(rotation[2, 2] < rotation[1, 1], second, third),
-    )
-    axis = column / ca.fmax(ca.norm_2(column), _SMALL)
-    return _angle_vector(axial, 0.5 * (ca.trace(rotation) - 1.0), axis)
-
-
-def _angle_vector(across: ca.SX, cosine: ca.SX, otherwise: ca.SX) -> ca.SX:
-    """Angle along ``across`` (3,), whose norm is the sine; half a turn goes about ``otherwise``."""
-    sine = ca.norm_2(across)
-    small = ca.if_else(cosine > 0.0, across, ca.pi * otherwise)
-    factor = ca.atan2(sine, cosine) / ca.fmax(sine, _SMALL)
-    return ca.if_else(sine > _SMALL, factor * across, small)
 
 
 def _point(arm: Arm, lengths: ca.SX, want: Parts) -> tuple[ca.SX, ca.SX]:

@@ -3,6 +3,7 @@
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.controllers.limits.limits import Limits
 from pneuarm.controllers.targets.targets import (
     DirectionTarget,
@@ -22,7 +23,7 @@ from pneuarm.controllers.tasks.backbone_point import BackbonePoint
 from pneuarm.controllers.tasks.chamber_lengths import ChamberLengths, Posture
 from pneuarm.controllers.tasks.task import Combined, Task
 from pneuarm.controllers.tasks.tip_direction import TipDirection
-from pneuarm.controllers.tasks.tip_pose import TipPose, rotation_from_quaternion
+from pneuarm.controllers.tasks.tip_pose import TipPose
 from pneuarm.controllers.tasks.tip_position import TipPosition
 from pneuarm.controllers.tasks.tip_twist import TipTwist
 

@@ -13,6 +13,10 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.feedback.estimator import TipEstimate
 from pneuarm.controllers.feedback.notch import Notch
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.reference.follower import Follower, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
@@ -23,7 +27,6 @@ from pneuarm.controllers.targets.targets import (
     ShapeTarget,
     Target,
 )
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.processes.pipe import SetTarget, SetTipPose
 

@@ -7,7 +7,11 @@ from google.protobuf.message import Message
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import InvalidInput, TargetRejected
-from pneuarm.controllers.geometry.frames import Frames, Transform
+from pneuarm.controllers.geometry.mountings import Mountings, Transform
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
 from pneuarm.controllers.targets.targets import (
     DirectionTarget,
@@ -23,7 +27,6 @@ from pneuarm.controllers.targets.targets import (
     TwistTarget,
     WeightedTarget,
 )
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.wire.shape_checks import ShapeChecker
 
@@ -49,11 +52,11 @@ class TargetChecker:
     def __init__(
         self,
         arm: Arm,
-        frames: Frames | None = None,
+        frames: Mountings | None = None,
         reference: ReferenceLimits | None = None,
     ) -> None:
         self._arm = arm
-        self._frames = frames or Frames()
+        self._frames = frames or Mountings()
         self._shapes = ShapeChecker(arm, reference or ReferenceLimits(), self._position)
         self._farthest_m = FARTHEST_ARM_LENGTHS * arm.max_length_m
         self._length_low, self._length_high = length_bounds_m(arm)

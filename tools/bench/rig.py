@@ -5,9 +5,9 @@ from collections import deque
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.targets.shapes import Shape
 from pneuarm.controllers.targets.targets import CircleTarget, PositionTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype

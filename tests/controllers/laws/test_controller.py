@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
 from pneuarm.controllers.laws.controller import Controller, Reach
 from pneuarm.controllers.laws.settings import ControlSettings
@@ -23,7 +24,6 @@ from pneuarm.controllers.targets.targets import (
     TargetKind,
     TwistTarget,
 )
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 from tests.controllers.laws.driving import DT_S, SETTINGS, every_arm, run
 from tools.rig.arms import paper_arm, random_lengths, table1_arm, trunk_arm
 

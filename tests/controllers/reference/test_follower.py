@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Response
 from pneuarm.controllers.feedback.prediction import discrete
-from pneuarm.controllers.geometry.frames import rotation_from_vector
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation, rotation_from_vector
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.reference.follower import Follower, Lead, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
 from pneuarm.controllers.targets.shapes import Circle
 from pneuarm.controllers.targets.targets import CircleTarget, PoseTarget, PositionTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 
 LIMITS = ReferenceLimits(0.5, 4.0, 80.0)
 DT_S = 1e-3
