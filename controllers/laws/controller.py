@@ -9,12 +9,10 @@ from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.laws.motion import Law, Motion
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.detour import Detour
-from pneuarm.controllers.reach.reach import Binding, BindingLimits, Progress, Reach
+from pneuarm.controllers.reach.reach import Progress, Reach
 from pneuarm.controllers.targets.targets import LawName, PressuresTarget, Target, TwistTarget
 from pneuarm.controllers.tasks.chamber_lengths import ChamberLengths
 from pneuarm.controllers.tasks.target_tasks import TaskMaker
-
-__all__ = ["Binding", "Controller", "Reach"]
 
 #: Lengths this near to the goal of the way round (m) are there.
 AT_GOAL_M = 2e-5
@@ -38,9 +36,8 @@ class Controller:
             LawName.RESOLVED_RATE: self._motion.resolved_rate,
             LawName.QP_IK: self._motion.qp_ik,
         }
-        self._tasks = TaskMaker(arm, self._limits)
-        self._detour = Detour(arm, self._limits)
-        self._binding = BindingLimits(arm, self._limits)
+        self._tasks = TaskMaker(arm)
+        self._detour = Detour(arm)
         self._progress = Progress(
             settings.reached_tolerance_m,
             settings.settled_time_s,
@@ -66,6 +63,7 @@ class Controller:
         """Run every law once at the rest lengths, so that no tick pays for a first use."""
         for law in self._laws.values():
             law.wish(self._motion.problem(1e-3))
+        self.binding()
 
     def start_from(self, pressures_pa: Array) -> None:
         """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
@@ -180,9 +178,9 @@ class Controller:
             pressures = self._inverse_play.sent_pa(pressures, self._sends_pressures)
         return np.minimum(np.maximum(pressures, self._pressure_low), self._pressure_high)
 
-    def binding(self) -> Binding:
-        """Return the limits that the commanded lengths touch."""
-        return self._binding.at(self.lengths_m)
+    def binding(self) -> int:
+        """Return the bits of the limits that the commanded lengths are at."""
+        return self._limits.binding(self.lengths_m)
 
 
 def _same(one: Target, other: Target | None) -> bool:

@@ -27,9 +27,6 @@ from pneuarm.controllers.tasks.wanted import symbols
 #: What rounding may take from a slack, m.
 _ROUNDING_M = 1e-14
 
-#: Of the slew limit, that a step to first order may use; the exact check follows.
-_SLEW_SHARE = 0.998
-
 #: Share of the acceleration that braking plans with.
 _BRAKING_SHARE = 0.8
 
@@ -101,7 +98,7 @@ class SafeStep:
         most = ca.vertcat(
             1.0,
             ca.norm_inf(wish),
-            self._limits.pressure.slew_share(lengths, wanted) / _SLEW_SHARE,
+            *(limit.rate_share(lengths, wanted) for limit in self._limits),
             tip_speed / (want["speed_max_m_s"] + _TINY),
             gain / braked,
         )
@@ -140,17 +137,13 @@ class SafeStep:
         """
         stop = moved + rates * (0.5 * self._stopping_time(rates))
         places = [moved, 0.5 * (moved + stop), stop]
-        rooms = [
-            ca.fmax(0.0, ca.fmin(0.5 * limit.margin_m, limit.slack(before)))
-            for limit in self._limits.others
-        ]
-        slacks = [limit.slack(stop) for limit in self._limits.convex]
-        slacks += [
-            limit.slack(place) - (share > 0.0) * room
-            for limit, room in zip(self._limits.others, rooms, strict=True)
-            for place in places
-        ]
-        slacks.append(self._limits.pressure.slew_slack(before, moved, dt))
+        slacks = [limit.step_slack(before, moved, dt) for limit in self._limits]
+        for limit in self._limits:
+            if limit.convex:
+                slacks.append(limit.slack(stop))
+                continue
+            room = ca.fmax(0.0, ca.fmin(0.5 * limit.margin_m, limit.slack(before)))
+            slacks += [limit.slack(place) - (share > 0.0) * room for place in places]
         every = ca.vertcat(*slacks)
         return ca.mmin(every) + 0.0 * ca.sum1(every)  # the minimum itself would drop a NaN
 

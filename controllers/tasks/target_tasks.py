@@ -1,10 +1,11 @@
 """The task of a target: from what was asked for to what the laws follow."""
 
-from pneuarm.controllers.actuation.pressure_map import PressureMap
+import numpy as np
+
+from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
-from pneuarm.controllers.limits.limits import Limits
 from pneuarm.controllers.targets.targets import (
     DirectionTarget,
     LengthsTarget,
@@ -31,8 +32,8 @@ from pneuarm.controllers.tasks.tip_twist import TipTwist
 class TaskMaker:
     """Makes the tasks of one arm's targets."""
 
-    def __init__(self, arm: Arm, limits: Limits) -> None:
-        self._limits, self._pressure_map = limits, PressureMap(arm)
+    def __init__(self, arm: Arm) -> None:
+        self._pressure_map, self._bounds_m = PressureMap(arm), length_bounds_m(arm)
 
     def task(self, target: Target) -> Task:
         """Return what the laws follow for a target."""
@@ -46,7 +47,7 @@ class TaskMaker:
                 )
             case PressuresTarget():
                 lengths = self._pressure_map.lengths_m(target.pressures_pa)
-                return ChamberLengths(self._limits.length.clip(lengths))
+                return ChamberLengths(np.clip(lengths, *self._bounds_m))
             case TasksTarget():
                 pairs = zip(target.targets, target.weights, strict=True)
                 return Combined(tuple(weighted(part, *weights) for part, weights in pairs))

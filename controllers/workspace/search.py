@@ -23,8 +23,7 @@ from pneuarm.controllers.kinematics.constant_curvature import (
     tip_transform,
 )
 from pneuarm.controllers.laws.motion import Motion
-from pneuarm.controllers.limits.limits import AT_BOUND_M
-from pneuarm.controllers.reach.reach import Binding
+from pneuarm.controllers.limits.limit import AT_BOUND_M
 from pneuarm.controllers.tasks.tip_position import TipPosition
 from pneuarm.controllers.workspace.reachability import LimitNames, Reachability
 from pneuarm.controllers.workspace.region import folded, unfolded
@@ -90,7 +89,7 @@ class SearchedRegion:
             again = self._from_boundary(inside)
             lengths, distance = min((lengths, distance), again, key=lambda pair: pair[1])
         if distance <= self.tolerance_m:
-            return Reachability(True, Binding.NOTHING, position_m.copy(), 0.0)
+            return Reachability(True, 0, position_m.copy(), 0.0)
         limits = self.limits.within(lengths, AT_BOUND_M)
         return Reachability(False, limits, unfolded(self.tip_m(lengths), turn, side), distance)
 

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError, model_validator
 
 from pneuarm.controllers.arm.arm import Arm, uncalibrated
 from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
-from pneuarm.controllers.limits.consistency import refuse_contradictions
+from pneuarm.controllers.limits.limits import refuse_contradictions
 from pneuarm.service.configuration.tables.arm import ArmConfig
 from pneuarm.service.configuration.tables.control import ControlConfig
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig, ReferenceConfig

@@ -13,8 +13,9 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.feedback.estimator import Estimator
 from pneuarm.controllers.feedback.observer import FeedbackSettings
 from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
-from pneuarm.controllers.laws.controller import Controller, Reach
+from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
 from pneuarm.controllers.targets.targets import KIND_OF, TargetKind
 from pneuarm.hardware.guard import Guard, Intervention

@@ -13,8 +13,9 @@ from pneuarm.controllers.kinematics.constant_curvature import (
     shapes_from_lengths,
     tip_transform,
 )
-from pneuarm.controllers.laws.controller import Controller, Reach
+from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import LawName, PositionTarget, Target
 from tools.rig.arms import ARMS
 

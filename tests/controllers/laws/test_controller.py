@@ -11,8 +11,9 @@ from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller, Reach
+from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import (
     KIND_OF,
     LawName,

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.constant_curvature import (
     section_transforms,
@@ -243,7 +244,7 @@ def test_posture_uses_what_the_tip_leaves_and_the_tip_stands_still() -> None:
     arm = trunk_arm()
     rng = np.random.default_rng(3)
     motion = motion_of(arm)
-    middle = 0.5 * (motion.limits.length.lower_m + motion.limits.length.upper_m)
+    middle = 0.5 * sum(length_bounds_m(arm))
     for _ in range(3):
         start = random_lengths(arm, rng, 0.7)
         motion.place(start)
