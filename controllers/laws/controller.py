@@ -3,16 +3,15 @@
 import numpy as np
 
 from pneuarm.controllers.actuation.inverse_play import InversePlay
-from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.laws.motion import Law, Motion
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.detour import Detour
 from pneuarm.controllers.reach.reach import Progress, Reach
-from pneuarm.controllers.targets.targets import LawName, PressuresTarget, Target, TwistTarget
-from pneuarm.controllers.tasks.chamber_lengths import ChamberLengths
-from pneuarm.controllers.tasks.target_tasks import TaskMaker
+from pneuarm.controllers.targets.chambers import LengthsTarget
+from pneuarm.controllers.targets.target import LawName, Target
 
 #: Lengths this near to the goal of the way round (m) are there.
 AT_GOAL_M = 2e-5
@@ -36,7 +35,7 @@ class Controller:
             LawName.RESOLVED_RATE: self._motion.resolved_rate,
             LawName.QP_IK: self._motion.qp_ik,
         }
-        self._tasks = TaskMaker(arm)
+        self._bounds_m = length_bounds_m(arm)
         self._detour = Detour(arm)
         self._progress = Progress(
             settings.reached_tolerance_m,
@@ -113,18 +112,21 @@ class Controller:
             self.reach, self.error_m = Reach.NONE, 0.0
             return
         settings = self.settings
-        self._motion.ask(self._tasks.task(target), settings.gain_per_s, settings.tip_speed_max_m_s)
-        self._sends_pressures = isinstance(target, PressuresTarget)
+        asked = target.in_lengths(self._lengths_of)
+        self._motion.ask(asked, settings.gain_per_s, settings.tip_speed_max_m_s)
+        self._sends_pressures = target.sends_pressures
         self.law_name = self._law_name(target)
         if self._detour.taken and self._detour.goal_m is not None:
-            self._motion.pursue(ChamberLengths(self._detour.goal_m))
+            self._motion.pursue(LengthsTarget(self._detour.goal_m))
 
     def _law_name(self, target: Target) -> LawName:
         if target.law != LawName.DEFAULT:
             return target.law
-        if isinstance(target, TwistTarget):
-            return LawName.RESOLVED_RATE
-        return self.settings.default_law
+        return target.default_law or self.settings.default_law
+
+    def _lengths_of(self, pressures_pa: Array) -> Array:
+        """Lengths (n_sections, 3) that pressures give, within their bounds."""
+        return np.clip(self._pressure_map.lengths_m(pressures_pa), *self._bounds_m)
 
     def step(self, dt_s: float) -> TipState:
         """Move the commanded lengths by one tick; return the tip they stand for, corrected.
@@ -142,7 +144,7 @@ class Controller:
 
     def _judge(self, error_m: float, dt_s: float) -> None:
         """Say whether the target is reached, being reached, or out of reach; or go round."""
-        if isinstance(self._target, TwistTarget):
+        if self._target is not None and not self._target.has_end:
             self.reach = Reach.MOVING
             return
         self.error_m = error_m
@@ -155,7 +157,7 @@ class Controller:
             self.reach = Reach.MOVING
         stalled = self.reach == Reach.OUT_OF_REACH
         if self._detour.begins(error_m, dt_s, stalled) and self._detour.goal_m is not None:
-            self._motion.pursue(ChamberLengths(self._detour.goal_m))
+            self._motion.pursue(LengthsTarget(self._detour.goal_m))
             self.reach = Reach.MOVING
             self._progress.start()
             self._way.start()
@@ -201,6 +203,6 @@ def _equal(one: object, other: object) -> bool:
     if isinstance(one, tuple) and isinstance(other, tuple):
         pairs = zip(one, other, strict=False)
         return len(one) == len(other) and all(
-            _same(a, b) if hasattr(a, "law") else _equal(a, b) for a, b in pairs
+            _same(a, b) if isinstance(a, Target) else _equal(a, b) for a, b in pairs
         )
     return type(one) is type(other) and one == other

@@ -21,6 +21,7 @@ from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.laws.solve_ik import IkProblem
 from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.targets.targets import PARTS, ROWS
 from pneuarm.controllers.tasks.rows import Parts, symbolic_rows
 from pneuarm.controllers.tasks.wanted import symbols
 
@@ -35,23 +36,25 @@ _TINY = 1e-12
 
 
 class SafeStep:
-    """The compiled step. Arguments are arrays of the caller's, see :class:`solve_ik.IkBuilder`."""
+    """The compiled step. Arguments are arrays of the caller's, see :class:`solve_ik.IkBuilder`.
 
-    def __init__(self, arm: Arm, limits: Limits, whole: bool) -> None:
+    ``task_rows`` is the number of rows of the problem's Jacobian.
+    """
+
+    def __init__(self, arm: Arm, limits: Limits, whole: bool, task_rows: int) -> None:
         self._arm, self._limits = arm, limits
         self._rate_max = ca.DM(arm.per_chamber("length_rate_max_m_s").reshape(-1))
         self._acceleration = ca.DM(arm.per_chamber("length_acceleration_max_m_s2").reshape(-1))
         n = arm.n_chambers
         lengths, rates, wish = (ca.SX.sym(name, n) for name in ("lengths", "rates", "wish"))
-        vector, want = symbols(n)
+        vector, want = symbols(n, PARTS)
         dt, share = ca.SX.sym("dt"), ca.SX.sym("share")
-        task_rows = 9 if whole else 3
         jacobian, checks = ca.SX.sym("jacobian", n, task_rows), ca.SX.sym("checks", 3)
         slowed = self._slowed(lengths, wish, dt, want, jacobian.T, checks[2])
         after = self._rates(rates, slowed, dt, share)
         moved = lengths + dt * after
         slack = self._slack(lengths, moved, after, dt, share)
-        rows = symbolic_rows(arm, moved, want, whole)
+        rows = symbolic_rows(arm, moved, want, ROWS, whole)
         self.function = CompiledFunction(
             "safe_step",
             [lengths, rates, vector, dt, wish, share, jacobian, checks],

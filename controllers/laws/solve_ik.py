@@ -24,6 +24,7 @@ from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.targets.targets import PARTS, ROWS
 from pneuarm.controllers.tasks.rows import Parts, symbolic_rows
 from pneuarm.controllers.tasks.wanted import symbols
 
@@ -115,7 +116,7 @@ class IkBuilder:
         self._rate_max = ca.DM(arm.per_chamber("length_rate_max_m_s").reshape(-1))
         self._acceleration = ca.DM(arm.per_chamber("length_acceleration_max_m_s2").reshape(-1))
         lengths, rates = (ca.SX.sym(name, arm.n_chambers) for name in ("lengths", "rates"))
-        vector, want = symbols(arm.n_chambers)
+        vector, want = symbols(arm.n_chambers, PARTS)
         dt = ca.SX.sym("dt")
         jacobian, rate, base, damping, by_feedback = self._cost(lengths, dt, want, whole)
         cost = jacobian.T @ jacobian + damping * ca.SX.eye(arm.n_chambers)
@@ -155,7 +156,7 @@ class IkBuilder:
         """Jacobian (m, n), rate (m,), base (n,), damping, and the share that is feedback."""
         largest = ca.mmax(self._rate_max)
         step, scale = self._rate_max * dt, largest * dt
-        rows = symbolic_rows(self._arm, lengths, want, whole)
+        rows = symbolic_rows(self._arm, lengths, want, ROWS, whole)
         jacobian = rows.jacobian @ ca.diag(self._rate_max / largest)
         damping = ca.fmax(want["lengths_weight"], DAMPING)
         chambers = want["lengths_weight"] / damping * (want["lengths_m"] - lengths) / step

@@ -24,7 +24,7 @@ from pneuarm.controllers.kinematics.constant_curvature import (
 )
 from pneuarm.controllers.laws.motion import Motion
 from pneuarm.controllers.limits.limit import AT_BOUND_M
-from pneuarm.controllers.tasks.tip_position import TipPosition
+from pneuarm.controllers.targets.position import PositionTarget
 from pneuarm.controllers.workspace.reachability import LimitNames, Reachability
 from pneuarm.controllers.workspace.region import folded, unfolded
 from pneuarm.controllers.workspace.support import Support, wedge_directions
@@ -129,7 +129,7 @@ class SearchedRegion:
         """Follow the QP law to the target; return the best lengths on the way and the distance."""
         motion = self._motion
         motion.place(lengths_m)
-        motion.ask(TipPosition(position_m, posture_weight=0.0), 1.0, 2.0 * _STEP_M)
+        motion.ask(PositionTarget(position_m, posture_weight=0.0), 1.0, 2.0 * _STEP_M)
         motion.place_tip()
         best, least = lengths_m, motion.error_m
         for _ in range(_STEPS):

@@ -56,7 +56,7 @@ class SolvedRegion:
         return Reachability(False, limits, nearest, distance)
 
     def exceeded(self, position_m: Array) -> int:
-        """Bits of the limits that the one arc to a position (3,) exceeds; length where no arc ends."""
+        """Bits of the limits that the one arc to a position exceeds; length where no arc ends."""
         if position_m[0] == position_m[1] == 0.0 and position_m[2] <= 0.0:
             return LengthLimit.bit
         return self.region.limits.within(self._lengths_m(position_m), -ROUNDING_M)

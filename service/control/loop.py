@@ -17,7 +17,6 @@ from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.controllers.targets.targets import KIND_OF, TargetKind
 from pneuarm.hardware.guard import Guard, Intervention
 from pneuarm.hardware.guarded import GuardedDevice, GuardedHardware
 from pneuarm.hardware.interface import Hardware, Measurement
@@ -390,10 +389,10 @@ class Loop:
         tick["target_position_m"] = np.nan
         tick["target_orientation_xyzw"] = np.nan
         if target is None:
-            tick["target_kind"] = int(TargetKind.NONE)
+            tick["target_kind"] = int(pb.NO_TARGET)
             tick["target_age_s"] = 0.0
             return
-        tick["target_kind"] = int(KIND_OF[type(target.target)])
+        tick["target_kind"] = target.target.kind
         tick["target_sequence"] = target.sequence
         tick["target_age_s"] = self._target_age_s()
         position, quaternion = self._steering.goal()

@@ -20,13 +20,7 @@ from pneuarm.controllers.geometry.rotations import (
 from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.reference.follower import Follower, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.controllers.targets.targets import (
-    PoseTarget,
-    PositionTarget,
-    PressuresTarget,
-    ShapeTarget,
-    Target,
-)
+from pneuarm.controllers.targets.targets import ShapeTarget, Target
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.processes.pipe import SetTarget, SetTipPose
 
@@ -154,7 +148,8 @@ class Steering:
         Pressures that are asked for are sent as they are: a lead that overshoots in the end would
         cross the play that a calibration wants to see.
         """
-        wanted = 0.0 if isinstance(self._target, PressuresTarget) else 1.0
+        asks_pressures = self._target is not None and self._target.sends_pressures
+        wanted = 0.0 if asks_pressures else 1.0
         largest = dt_s / _RAMP_S
         self._lead_share += min(max(wanted - self._lead_share, -largest), largest)
         return self._valves.sent_pa(wanted_pa, dt_s, self._lead_share) + self._dither_pa(now_s)
@@ -231,10 +226,7 @@ class Steering:
     def goal(self) -> tuple[Array | list[float], Array | None]:
         """Position (3,) that is wanted now, a shape's on the shape, and quaternion or None."""
         target = self._target
-        if isinstance(target, PoseTarget):
-            return target.position_m, target.quaternion_xyzw
-        if isinstance(target, PositionTarget):
-            return target.position_m, None
         if isinstance(target, ShapeTarget):
             return self._follower.goal_position, None
-        return _NONE, None
+        position, quaternion = (None, None) if target is None else target.goal()
+        return _NONE if position is None else position, quaternion

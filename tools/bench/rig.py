@@ -6,7 +6,6 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
-from pneuarm.controllers.targets.shapes import Shape
 from pneuarm.controllers.targets.targets import CircleTarget, PositionTarget, Target
 from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.logs.rings.status import Disk
@@ -152,6 +151,6 @@ class Rig:
         """Go to a position."""
         return self.run(seconds, PositionTarget(np.asarray(position_m, dtype=np.float64)))
 
-    def circle(self, shape: Shape, seconds: float) -> np.ndarray:
+    def circle(self, shape: CircleTarget, seconds: float) -> np.ndarray:
         """Go round."""
-        return self.run(seconds, CircleTarget(shape, 1))
+        return self.run(seconds, shape)

@@ -15,14 +15,12 @@ from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import (
-    KIND_OF,
     LawName,
     LengthsTarget,
     PoseTarget,
     PositionTarget,
     PressuresTarget,
     Target,
-    TargetKind,
     TwistTarget,
 )
 from tests.controllers.laws.driving import DT_S, SETTINGS, every_arm, run
@@ -55,11 +53,6 @@ def test_the_default_law_is_a_setting() -> None:
     controller = Controller(paper_arm(), ControlSettings(default_law=LawName.RESOLVED_RATE))
     controller.set_target(POSITION)
     assert controller.law_name == LawName.RESOLVED_RATE
-
-
-def test_every_target_has_its_kind_on_the_wire() -> None:
-    assert set(KIND_OF) == set(Target.__args__)  # type: ignore[attr-defined]
-    assert sorted(KIND_OF.values()) == [kind for kind in TargetKind if kind != TargetKind.NONE]
 
 
 @every_arm

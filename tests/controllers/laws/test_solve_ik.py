@@ -13,8 +13,8 @@ from pneuarm.controllers.laws.solve_ik import DAMPING, IkBuilder, IkProblem, IkS
 from pneuarm.controllers.limits.bend import BendLimit
 from pneuarm.controllers.limits.length import LengthLimit
 from pneuarm.controllers.limits.limits import Limits
-from pneuarm.controllers.tasks.task import fill
-from pneuarm.controllers.tasks.tip_twist import TipTwist
+from pneuarm.controllers.targets.targets import PARTS
+from pneuarm.controllers.targets.twist import TwistTarget
 from pneuarm.controllers.tasks.wanted import Wanted
 from tools.rig.arms import ARMS, paper_arm, random_lengths
 
@@ -29,14 +29,14 @@ class Bench:
         self.arm, self.limits = arm, Limits(arm)
         self.builder = IkBuilder(arm, self.limits, whole=True)
         self.lengths, self.rates = np.zeros(arm.n_chambers), np.zeros(arm.n_chambers)
-        self.wanted, self.dt_s = Wanted(arm.n_chambers), np.full(1, DT_S)
+        self.wanted, self.dt_s = Wanted(arm.n_chambers, PARTS), np.full(1, DT_S)
         self.builder.function.bind([self.lengths, self.rates, self.wanted.values, self.dt_s])
         self.solver = IkSolver(arm.n_chambers, self.builder.pattern)
         self.kinematics = CompiledKinematics(arm)
 
     def build(self, lengths: Array, velocity_m_s: Array, gain_per_s: float = 30.0) -> IkProblem:
         self.lengths[:] = lengths.reshape(-1)
-        fill(self.wanted, TipTwist(velocity_m_s, None, False, False), gain_per_s, 1.0)
+        TwistTarget(velocity_m_s, None, False, False).ask(self.wanted, gain_per_s, 1.0)
         self.wanted["posture_weight"] = 0.0
         self.builder.function.call()
         problem = self.builder.problem

@@ -15,7 +15,7 @@ from pneuarm.controllers.limits.bend import BendLimit
 from pneuarm.controllers.limits.keep_out import KeepOutLimit
 from pneuarm.controllers.limits.length import LengthLimit
 from pneuarm.controllers.limits.limit import Limit
-from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.limits.limits import KINDS, Limits, names
 from pneuarm.controllers.limits.pressure import PressureLimit
 from tests.controllers.laws.driving import clearance_m
 from tools.rig.arms import ARMS, random_lengths
@@ -106,3 +106,14 @@ def test_unbending_keeps_the_length_bounds_that_held_before(arm: Arm, seed: int)
     assert (clipped < arm.per_chamber("length_max_m")).all()
     assert (bend_rad(arm, clipped) <= arm.per_section("bend_max_rad")[:, 0] + 1e-12).all()
     np.testing.assert_allclose(limits.clip(clipped), clipped, atol=1e-15)
+
+
+def test_every_limit_has_a_name_and_a_bit_of_its_own() -> None:
+    assert {kind.bit: kind.name for kind in KINDS} == {
+        1: "length",
+        2: "bend",
+        4: "pressure",
+        8: "keep-out",
+    }
+    assert names(0) == ()
+    assert set(names(2 | 8)) == {"bend", "keep-out"}

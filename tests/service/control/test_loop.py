@@ -12,11 +12,11 @@ from pneuarm.controllers.targets.targets import (
     PositionTarget,
     PressuresTarget,
     Target,
-    TargetKind,
     TwistTarget,
 )
 from pneuarm.hardware.guard import Intervention
 from pneuarm.logs.rings.status import Disk
+from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.control.loop import Timing
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import Heartbeat, RequestMode, SetTipPose
@@ -68,13 +68,13 @@ def test_out_of_reach_is_said_with_the_limit_that_binds(
 @pytest.mark.parametrize(
     ("target", "kind"),
     [
-        (NEAR, TargetKind.POSITION),
-        (LengthsTarget(np.array([[0.21, 0.2, 0.19]])), TargetKind.LENGTHS),
-        (PressuresTarget(np.array([[1e4, 0.0, -1e4]])), TargetKind.PRESSURES),
-        (TwistTarget(np.array([0.01, 0, 0]), None, False, False), TargetKind.TWIST),
+        (NEAR, PositionTarget.kind),
+        (LengthsTarget(np.array([[0.21, 0.2, 0.19]])), LengthsTarget.kind),
+        (PressuresTarget(np.array([[1e4, 0.0, -1e4]])), PressuresTarget.kind),
+        (TwistTarget(np.array([0.01, 0, 0]), None, False, False), TwistTarget.kind),
     ],
 )
-def test_the_record_tells_the_target_it_follows(target: Target, kind: TargetKind) -> None:
+def test_the_record_tells_the_target_it_follows(target: Target, kind: int) -> None:
     bench = Bench().activate()
     command = bench.target(target, age_s=0.05)
     tick = bench.tick(command)
@@ -84,7 +84,7 @@ def test_the_record_tells_the_target_it_follows(target: Target, kind: TargetKind
     assert np.isfinite(tick["target_position_m"]).all() == known
     assert bench.tick()["target_age_s"] == pytest.approx(0.052)
     bench.ask(ModeEvent.HOLD)
-    assert bench.newest["target_kind"] == TargetKind.NONE
+    assert bench.newest["target_kind"] == pb.NO_TARGET
     assert np.isnan(bench.newest["target_position_m"]).all()
 
 
@@ -97,7 +97,7 @@ def test_targets_that_come_before_active_are_dropped(order: str) -> None:
     else:  # in the same tick, ahead of the request
         bench.tick(bench.target(NEAR), RequestMode(ModeEvent.ENABLE, 2, "me"))
     assert bench.mode == Mode.ACTIVE
-    assert bench.run(0.5)["target_kind"] == TargetKind.NONE
+    assert bench.run(0.5)["target_kind"] == pb.NO_TARGET
     assert not bench.newest["pressure_sent_pa"].any() or (
         np.abs(bench.newest["pressure_sent_pa"]).max() < 2000.0
     )
