@@ -1,4 +1,4 @@
-"""One step of differential inverse kinematics as a QP: build_ik makes it, IkSolver solves it.
+"""One step of differential inverse kinematics as a QP: IkBuilder makes it, IkSolver solves it.
 
     minimise    |J dq - rate dt|^2 + damping |dq - base|^2
     subject to  lower <= G dq <= upper        (what the limits leave, linearised)
@@ -105,7 +105,7 @@ class IkProblem:
 
 
 class IkBuilder:
-    """build_ik, compiled: the whole problem in one call.
+    """The compiled function that makes the whole problem in one call.
 
     The arguments are arrays that the caller owns and changes in place: ``lengths_m`` and
     ``rates_m_s`` (n_chambers,), the vector of what is wanted, and ``dt_s`` (1,).

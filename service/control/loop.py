@@ -10,10 +10,10 @@ from math import inf
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.feedback.estimator import Estimator
 from pneuarm.controllers.feedback.observer import FeedbackSettings
 from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.reference.trajectory import ReferenceLimits

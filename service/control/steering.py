@@ -10,6 +10,7 @@ from pneuarm.controllers.actuation.dither import Dither
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.actuation.valve_lead import ValveLead
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.feedback.estimator import TipEstimate
 from pneuarm.controllers.feedback.notch import Notch
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
@@ -17,7 +18,6 @@ from pneuarm.controllers.geometry.rotations import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.reference.follower import Follower, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
 from pneuarm.controllers.targets.targets import ShapeTarget, Target

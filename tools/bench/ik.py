@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.targets.targets import PositionTarget
 from tools.rig.arms import paper_arm, random_lengths

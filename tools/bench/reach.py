@@ -14,8 +14,8 @@ from scipy.optimize import minimize
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array, Sphere
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths, tip_transform
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.limits.keep_out import KeepOutLimit
 from pneuarm.controllers.reach.reach import Reach

@@ -7,13 +7,13 @@ import pytest
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm, Array, KeepOut, Sphere
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import (
     section_end_transforms,
     section_transforms,
     shapes_from_lengths,
     tip_transform,
 )
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import LawName, PositionTarget, Target

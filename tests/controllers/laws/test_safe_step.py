@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Arm, HalfSpace, Sphere
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.limits.keep_out import KeepOutLimit
 from pneuarm.controllers.limits.limits import refuse_contradictions
 from pneuarm.controllers.reach.reach import Reach

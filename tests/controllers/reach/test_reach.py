@@ -8,7 +8,7 @@ import pytest
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
-from pneuarm.controllers.laws.controller import Controller
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.limits.bend import BendLimit
 from pneuarm.controllers.limits.length import LengthLimit
 from pneuarm.controllers.limits.pressure import PressureLimit

@@ -19,7 +19,7 @@ from pneuarm.controllers.kinematics.constant_curvature import (
     shapes_from_lengths,
 )
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform as tip_of
-from pneuarm.controllers.laws.motion import Motion
+from pneuarm.controllers.laws.commanded_chambers import CommandedChambers
 from pneuarm.controllers.targets.targets import (
     PARTS,
     ROWS,
@@ -149,7 +149,7 @@ def test_following_a_task_comes_closer(kind: str, arm: Arm, seed: int) -> None:
     assert motion.error_m < 0.1 * before
 
 
-motion_of = cache(Motion)
+motion_of = cache(CommandedChambers)
 
 
 def test_the_error_of_a_position_is_the_distance() -> None:

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import (

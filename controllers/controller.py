@@ -6,7 +6,7 @@ from pneuarm.controllers.actuation.inverse_play import InversePlay
 from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.compiled import TipState
-from pneuarm.controllers.laws.motion import Law, Motion
+from pneuarm.controllers.laws.commanded_chambers import CommandedChambers, Law
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.detour import Detour
 from pneuarm.controllers.reach.reach import Progress, Reach
@@ -25,15 +25,15 @@ class Controller:
         self.reach = Reach.NONE
         self.error_m = 0.0
         self.law_name = settings.default_law
-        self._motion = Motion(arm)
-        self._limits = self._motion.limits
+        self._chambers = CommandedChambers(arm)
+        self._limits = self._chambers.limits
         self._pressure_map = PressureMap(arm)
         self._inverse_play = InversePlay(arm)
         self._pressure_low = arm.per_chamber("pressure_min_pa")
         self._pressure_high = arm.per_chamber("pressure_max_pa")
         self._laws: dict[LawName, Law] = {
-            LawName.RESOLVED_RATE: self._motion.resolved_rate,
-            LawName.QP_IK: self._motion.qp_ik,
+            LawName.RESOLVED_RATE: self._chambers.resolved_rate,
+            LawName.QP_IK: self._chambers.qp_ik,
         }
         self._bounds_m = length_bounds_m(arm)
         self._detour = Detour(arm)
@@ -50,26 +50,26 @@ class Controller:
         self._offset_m, self._turn = np.zeros(3), np.eye(3)
         # Of the vented arm as it hangs, until it is started from something.
         vented = self._pressure_map.lengths_m(np.zeros((arm.n_sections, 3)))
-        self._motion.place(self._limits.clip(vented))
-        self.lengths_m = self._motion.lengths_m
+        self._chambers.place(self._limits.clip(vented))
+        self.lengths_m = self._chambers.lengths_m
 
     @property
     def fallbacks(self) -> int:
         """How often the QP gave no usable result, and the damped law went on instead."""
-        return self._motion.qp_ik.fallbacks
+        return self._chambers.qp_ik.fallbacks
 
     def warm_up(self) -> None:
         """Run every law once at the rest lengths, so that no tick pays for a first use."""
         for law in self._laws.values():
-            law.wish(self._motion.problem(1e-3))
+            law.wish(self._chambers.problem(1e-3))
         self.binding()
 
     def start_from(self, pressures_pa: Array) -> None:
         """Take the lengths of the given pressures (n_sections, 3), clipped, without a target."""
         if not self._inverse_play.none:
             pressures_pa = self._inverse_play.start_from(pressures_pa)
-        self._motion.place(self._limits.clip(self._pressure_map.lengths_m(pressures_pa)))
-        self.lengths_m = self._motion.lengths_m
+        self._chambers.place(self._limits.clip(self._pressure_map.lengths_m(pressures_pa)))
+        self.lengths_m = self._chambers.lengths_m
         self.set_target(None)
 
     def set_correction(self, offset_m: Array, rotation: Array) -> None:
@@ -78,7 +78,7 @@ class Controller:
         The laws then see the tip at ``p(q) + offset_m`` (3,), turned to ``rotation R(q)`` (3, 3).
         """
         self._offset_m, self._turn = offset_m, rotation
-        self._motion.correct(offset_m, rotation)
+        self._chambers.correct(offset_m, rotation)
 
     def set_hysteresis_share(self, share: float) -> None:
         """Invert so much of the calibrated hysteresis, 0 to 1, from now on."""
@@ -87,11 +87,11 @@ class Controller:
     @property
     def model_tip(self) -> TipState:
         """Tip of the commanded lengths by the model alone; reused by the next step."""
-        return self._motion.tip
+        return self._chambers.tip
 
     def tip(self) -> TipState:
         """Tip of the commanded lengths with the correction, in the base frame."""
-        model = self._motion.tip
+        model = self._chambers.tip
         return TipState(
             model.position_m + self._offset_m, self._turn @ model.rotation, model.jacobian
         )
@@ -113,11 +113,11 @@ class Controller:
             return
         settings = self.settings
         asked = target.in_lengths(self._lengths_of)
-        self._motion.ask(asked, settings.gain_per_s, settings.tip_speed_max_m_s)
+        self._chambers.ask(asked, settings.gain_per_s, settings.tip_speed_max_m_s)
         self._sends_pressures = target.sends_pressures
         self.law_name = self._law_name(target)
         if self._detour.taken and self._detour.goal_m is not None:
-            self._motion.pursue(LengthsTarget(self._detour.goal_m))
+            self._chambers.pursue(LengthsTarget(self._detour.goal_m))
 
     def _law_name(self, target: Target) -> LawName:
         if target.law != LawName.DEFAULT:
@@ -136,10 +136,10 @@ class Controller:
         if not 0.0 < dt_s < np.inf:
             return self.tip()
         law = None if self._target is None else self._laws[self.law_name]
-        self._motion.step(law, dt_s)
-        self.lengths_m = self._motion.lengths_m
+        self._chambers.step(law, dt_s)
+        self.lengths_m = self._chambers.lengths_m
         if self._target is not None:
-            self._judge(self._motion.error_m, dt_s)
+            self._judge(self._chambers.error_m, dt_s)
         return self.tip()
 
     def _judge(self, error_m: float, dt_s: float) -> None:
@@ -157,7 +157,7 @@ class Controller:
             self.reach = Reach.MOVING
         stalled = self.reach == Reach.OUT_OF_REACH
         if self._detour.begins(error_m, dt_s, stalled) and self._detour.goal_m is not None:
-            self._motion.pursue(LengthsTarget(self._detour.goal_m))
+            self._chambers.pursue(LengthsTarget(self._detour.goal_m))
             self.reach = Reach.MOVING
             self._progress.start()
             self._way.start()

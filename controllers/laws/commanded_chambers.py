@@ -35,7 +35,7 @@ class _Compiled:
         self.safe = SafeStep(arm, limits, whole, self.builder.problem.rate.size)
 
 
-class Motion:
+class CommandedChambers:
     """The commanded lengths and rates of an arm, and how they follow what is wanted.
 
     ``wanted`` is what the error is measured by; ``pursued`` is what the step follows: the same,
