@@ -44,6 +44,15 @@ _END_S = 5.0
 #: The end takes no longer than this: more than all its patience together.
 LAST_RESORT_S = 60.0
 
+#: Module of each process, with its `main`.
+MODULES = {
+    "control": "pneuarm.service.control.process",
+    "device": "pneuarm.service.devices.process",
+    "gateway": "pneuarm.service.wire.gateway",
+    "recorder": "pneuarm.service.daemon.recorder",
+    "viewer": "pneuarm.service.daemon.viewer",
+}
+
 #: Libraries that would start threads of their own in every process.
 _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -130,7 +139,7 @@ class Supervisor:
         if self._shared.device is None:
             return None
         arguments = (self._shared, self._arm_lock, self._device_lock)
-        child = Child("device", self._context, arguments, self._shared.processes)
+        child = Child("device", MODULES["device"], self._context, arguments, self._shared.processes)
         self._children["device"] = child
         return DeviceKeeper(configuration, self._shared.device, child)
 
@@ -199,7 +208,7 @@ class Supervisor:
             self._add("viewer", (shared,))
 
     def _add(self, name: str, arguments: tuple[object, ...]) -> Child:
-        child = Child(name, self._context, arguments, self._shared.processes)
+        child = Child(name, MODULES[name], self._context, arguments, self._shared.processes)
         child.start()
         self._children[name] = child
         return child

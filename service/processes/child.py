@@ -13,20 +13,12 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from pneuarm.controllers.arm.errors import PneuarmError
 from pneuarm.service.processes.usage import ProcessTable
 
-#: Module of each process; loaded in the child only, so that the parent stays small.
-MODULES = {
-    "control": "pneuarm.service.control.process",
-    "device": "pneuarm.service.devices.process",
-    "gateway": "pneuarm.service.wire.gateway",
-    "recorder": "pneuarm.service.daemon.recorder",
-    "viewer": "pneuarm.service.daemon.viewer",
-}
 _REVIVE_AFTER_S = 1.0
 
 
-def enter(name: str, arguments: tuple[object, ...]) -> None:
+def enter(name: str, module: str, arguments: tuple[object, ...]) -> None:
     """Run a process's own `main`; this is what the new interpreter starts with."""
-    main: Callable[..., None] = importlib.import_module(MODULES[name]).main
+    main: Callable[..., None] = importlib.import_module(module).main
     try:
         main(*arguments)
     except PneuarmError as error:
@@ -38,16 +30,20 @@ def enter(name: str, arguments: tuple[object, ...]) -> None:
 
 
 class Child:
-    """One process. The last argument of its `main` is a connection that says when to end."""
+    """One process. The last argument of its `main` is a connection that says when to end.
+
+    Its module is loaded in the child only, so that the parent stays small.
+    """
 
     def __init__(
         self,
         name: str,
+        module: str,
         context: SpawnContext,
         arguments: tuple[object, ...],
         table: ProcessTable,
     ) -> None:
-        self.name = name
+        self.name, self._module = name, module
         self._context, self._arguments, self._table = context, arguments, table
         self._process: SpawnProcess | None = None
         self._end: Connection | None = None
@@ -57,7 +53,7 @@ class Child:
     def start(self) -> None:
         """Start it, or start it again."""
         theirs, self._end = self._context.Pipe(duplex=False)
-        arguments = (self.name, (*self._arguments, theirs))
+        arguments = (self.name, self._module, (*self._arguments, theirs))
         self._process = self._context.Process(target=enter, args=arguments, name=self.name)
         self._start_unheard(self._process)
         theirs.close()

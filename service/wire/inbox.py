@@ -8,7 +8,7 @@ import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
 from pneuarm.controllers.limits.limits import names, workspace_is_exact
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 from pneuarm.controllers.workspace.reachability import Reachability
@@ -68,8 +68,8 @@ class Inbox:
                 self._check_active()
             told = self._towards_nearest(target, message.client_id, received_ns)
             self._stream.send(SetTarget(told, message.sequence, received_ns))
-        except TargetRejected as error:
-            self._notes.reject(TARGET.key, str(error), payload, message.client_id)
+        except MessageRejected as error:
+            self._notes.reject(TARGET.key, str(error), message.client_id, payload, message.sequence)
             return
         message.lease_secret = ""  # the log is no place for it
         self._notes.log(TARGET, message, received_ns)
@@ -138,8 +138,8 @@ class Inbox:
             message = decode(PoseInFrame, payload, str(sample.encoding))
             self._publisher_of_poses.check(sample, message, received_ns * 1e-9)
             position, quaternion = self._checker.tip_pose(message)
-        except TargetRejected as error:
-            self._notes.reject(TIP_POSE.key, str(error), payload, "")
+        except MessageRejected as error:
+            self._notes.reject(TIP_POSE.key, str(error), "", payload)
             return
         self._stream.send(SetTipPose(position, quaternion, received_ns))
         self._notes.log(TIP_POSE, message, received_ns)

@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf import json_format
 from google.protobuf.message import Message
 
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import JSON, PROTOBUF, decode
 from pneuarm.logs.schema.topics import full_key
@@ -101,7 +101,7 @@ def is_request(payload: bytes, encoding: str) -> bool:
     """Say whether a payload is a request that anybody may make."""
     try:
         request = decode(pb.ModeRequest, payload, encoding)
-    except TargetRejected:
+    except MessageRejected:
         return False
     anybodys = request.action in (pb.HOLD_NOW, pb.VENT, pb.RESET)
     return anybodys or request.take_over
