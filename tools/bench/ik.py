@@ -62,7 +62,7 @@ class Candidate:
     def run(self, targets: int) -> None:
         """Time every step of some motions."""
         step, clock = self._controller.step, time.perf_counter
-        solver = self._controller._motion.qp_ik._solver
+        solver = self._controller._chambers.qp_ik._solver
         for _ in range(targets):
             self._controller.set_target(self._target())
             if self._far:  # on the way there, untimed

@@ -258,7 +258,7 @@ def acceptance(arm: Arm, ticks: int, seed: int) -> dict[str, object]:
     arm = replace(arm, keep_outs=(ball,), body_radius_m=0.02, sections=(section, *arm.sections[1:]))
     rng, controller, watch = np.random.default_rng(seed), Controller(arm, SETTINGS), Watch(arm)
     place(controller, arm, arm.rest_lengths_m, watch)
-    solver = controller._motion.qp_ik._solver
+    solver = controller._chambers.qp_ik._solver
     for tick in range(ticks):
         if tick % 60 == 0:
             far = 1.2 * arm.max_length_m * rng.uniform(-1.0, 1.0, 3)

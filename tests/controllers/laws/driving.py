@@ -98,7 +98,7 @@ def clearance_m(arm: Arm, lengths: Array, place: KeepOut) -> float:
 
 def run(arm: Arm, controller: Controller, target: Target, seconds: float = 8.0) -> None:
     """Follow a target; no tick may leave a limit."""
-    before, rates = controller.lengths_m.copy(), controller._motion.rates_m_s
+    before, rates = controller.lengths_m.copy(), controller._chambers.rates_m_s
     for lengths in path(arm, controller, target, seconds):
         rates = assert_within_limits(arm, before, lengths, rates)
         before = lengths

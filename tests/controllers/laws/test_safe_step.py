@@ -68,7 +68,7 @@ def test_no_limit_is_exceeded_whatever_is_asked_for(arm: Arm, seed: int) -> None
     rng = np.random.default_rng(seed)
     controller = controller_of(arm)
     controller.start_from(np.zeros((arm.n_sections, 3)))
-    before, rates = controller.lengths_m, controller._motion.rates_m_s
+    before, rates = controller.lengths_m, controller._chambers.rates_m_s
     for _ in range(6):
         controller.set_target(garbage(arm, rng))
         for _ in range(int(rng.integers(1, 25))):  # the next one comes at full speed
@@ -140,7 +140,7 @@ def test_braking_is_part_of_every_stop() -> None:
     controller.set_target(PositionTarget(np.array([0.08, 0.0, 0.25])))
     for _ in range(40):
         controller.step(DT_S)
-    before, rates = controller.lengths_m, controller._motion.rates_m_s
+    before, rates = controller.lengths_m, controller._chambers.rates_m_s
     assert np.abs(rates).max() > 0.05
     controller.set_target(None)
     for _ in range(20):
