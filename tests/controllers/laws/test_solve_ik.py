@@ -38,7 +38,7 @@ class Bench:
         self.lengths[:] = lengths.reshape(-1)
         TwistTarget(velocity_m_s, None, False, False).ask(self.wanted, gain_per_s, 1.0)
         self.wanted["posture_weight"] = 0.0
-        self.builder.function.call()
+        self.builder.function.evaluate()
         problem = self.builder.problem
         return replace(problem, **{name: getattr(problem, name).copy() for name in ARRAYS})
 
