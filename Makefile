@@ -8,7 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo faults damage test test-slow test-lowest check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults damage test test-slow test-lowest check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -39,17 +39,20 @@ test: check
 test-slow: setup
 	$(BIN)/pytest -m slow
 
-# Style, types, import contracts, and generated code that still matches its .proto.
+# Style, types, import contracts; what the client's distribution holds also as Python 3.10 sees it.
+CLIENT := pneuarm/__init__.py pneuarm/__main__.py \
+    $(addprefix pneuarm/, controllers/arm/errors.py logs/schema service/client service/network)
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --python-version 3.10 $(CLIENT)
 	$(BIN)/lint-imports
 
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
 # The finite elements are recorded; `python -m tools.validation.finite_elements` solves them anew.
 validate: bench-setup
-	$(BIN)/python -m pneuarm.service.validation.report --out docs
+	$(BIN)/python -m tools.validation.report --out docs
 
 # Every benchmark, one after another, on a machine that does nothing else; writes its table.
 bench: bench-setup
@@ -58,6 +61,10 @@ bench: bench-setup
 # The peers that the benchmarks compare with; nothing else needs them.
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
+
+# The tables of docs/ that stand in the code: keys, messages, faults, modes.
+docs: setup
+	$(BIN)/python -m tools.docs
 
 # Message classes run with their protoc's protobuf or a newer one: 5.29 is what the oldest
 # environments have that the client shall share, and what foxglove-schemas-protobuf was made with.

@@ -1,3 +1,4 @@
+from google.protobuf import descriptor_pb2 as _descriptor_pb2
 from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
@@ -119,6 +120,8 @@ LEVEL_UNSPECIFIED: Level
 INFO: Level
 WARNING: Level
 ERROR: Level
+ELEMENTS_FIELD_NUMBER: _ClassVar[int]
+elements: _descriptor.FieldDescriptor
 
 class Vector3(_message.Message):
     __slots__ = ("x", "y", "z")

@@ -63,7 +63,7 @@ def _progress(label: str, share: float) -> None:
         print(f"\r{label:32} [{bar:30}]", end="", file=sys.stderr, flush=True)
 
 
-def perform(
+def draw_figures(
     client: Client, arm: Arm, label: str, seconds: dict[str, float]
 ) -> dict[str, tuple[int, int]]:
     """Go through the phases that ``seconds`` names; 0 is at the figures' middle."""
@@ -123,7 +123,7 @@ def main() -> int:
         client.enable()
         if wanted["camera"]:
             _wait_for_camera(client)
-        phases = perform(client, arm, wanted["label"], wanted["seconds"])
+        phases = draw_figures(client, arm, wanted["label"], wanted["seconds"])
     print(json.dumps(phases))
     return 0
 

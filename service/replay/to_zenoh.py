@@ -1,4 +1,4 @@
-"""A recorded session over Zenoh: states, tip, tf, health and events with their timing."""
+"""A recorded session over Zenoh: everything that a daemon publishes, with its timing."""
 
 import time
 
@@ -7,11 +7,11 @@ import zenoh
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.replay import paced
 from pneuarm.logs.schema.codec import encoding_of
-from pneuarm.logs.schema.topics import ALIVE_DAEMON, EVENT, HEALTH, STATE, TF, TIP, full_key
+from pneuarm.logs.schema.topics import ALIVE_DAEMON, TOPICS, full_key
 from pneuarm.service.network import sessions as network
 from pneuarm.service.replay.telling import say, say_damage
 
-_OUT = (STATE, TIP, TF, HEALTH, EVENT)
+_OUT = tuple(topic for topic in TOPICS if topic.direction == "out")
 
 
 def replay_over_zenoh(reader: LogReader, speed: float, loop: bool, listen: str) -> int:

@@ -89,12 +89,17 @@ class Garbage:
         """Return any value JSON can hold, under names that mean something here."""
         rng = self._random
         names = ("position", "position_m", "x", "action", "lengths", "length_m", "law", "frame_id")
-        leaves = (None, True, 1e308, -1, 2**70, "NaN", "base", "\ud800", "ENABLE", [], {})
+        leaves: list[object] = [None, True, 1e308, -1, 2**70, "NaN", "base", "\ud800", "ENABLE"]
+        leaves += [[], {}]
         if depth == 0 or rng.random() < 0.3:
             return rng.choice(leaves)
         if rng.random() < 0.3:
             return [self._wild(depth - 1) for _ in range(rng.randrange(4))]
         return {rng.choice(names): self._wild(depth - 1) for _ in range(rng.randrange(4))}
+
+
+def _ignore(reply: zenoh.Reply) -> None:
+    """Leave an answer unread."""
 
 
 def is_request(payload: bytes, encoding: str) -> bool:
@@ -112,7 +117,7 @@ class Fuzzer:
 
     def __init__(self, arm: str, endpoint: str) -> None:
         self._session = network.open_connected(endpoint)
-        self._key = lambda key: full_key(arm, key)
+        self._arm = arm
         self._room = threading.Semaphore(64)  # queries under way
 
     def send(self, seed: int, number: int) -> int:
@@ -136,7 +141,7 @@ class Fuzzer:
 
     def _put(self, key: str, payload: bytes, encoding: str) -> None:
         self._session.put(
-            self._key(key),
+            full_key(self._arm, key),
             payload,
             encoding=encoding,
             congestion_control=zenoh.CongestionControl.BLOCK,
@@ -145,8 +150,8 @@ class Fuzzer:
     def _ask(self, key: str, payload: bytes, encoding: str) -> None:
         self._room.acquire(timeout=3.0)
         self._session.get(
-            self._key(key),
-            zenoh.handlers.Callback(lambda reply: None, self._room.release),
+            full_key(self._arm, key),
+            zenoh.handlers.Callback(_ignore, self._room.release),
             payload=payload,
             encoding=encoding,
             timeout=3.0,

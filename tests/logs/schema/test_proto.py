@@ -7,7 +7,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 
 _PROTO = (Path(__file__).parents[3] / "logs/schema/pneuarm.proto").read_text()
 _BLOCK = re.compile(r"^message (\w+) \{(\}|.*?^\})", re.MULTILINE | re.DOTALL)
-_FIELD = re.compile(r"(\w+) = (\d+);")
+_FIELD = re.compile(r"(\w+) = (\d+)(?: \[.*\])?;")
 
 
 def test_every_message_has_the_fields_of_its_definition() -> None:

@@ -10,7 +10,7 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.constant_curvature import lengths_from_shapes
 from pneuarm.controllers.kinematics.models.paper import SingularityFree
 from pneuarm.logs.view.pyplot import pyplot
-from pneuarm.service.validation.models import (
+from tools.validation.models import (
     MOUNTINGS,
     all_models,
     reference_rod,
