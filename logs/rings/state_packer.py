@@ -57,7 +57,7 @@ class StatePacker:
 
     def pack(self, record: bytes) -> bytes:
         """Return the serialised ArmState of a tick; what is zero or not known is left out."""
-        written = []
+        written: list[bytes] = []
         values = self._in_order(self._unpack(record))
         for (kind, tag), value in zip(self._fields, values, strict=True):
             if kind == _VARINT:
