@@ -51,23 +51,22 @@ class StatePacker:
         self._unpack = struct.Struct("<" + "".join(codes)).unpack
         order = sorted(range(len(fields)), key=lambda index: fields[index].number)
         self._in_order = itemgetter(*order)
-        #: Of each field, in the order of their numbers: its kind, and what goes before its value.
-        self._fields = [_kind_and_tag(fields[index], sizes[index]) for index in order]
+        #: Of each field, in the order of their numbers: its kind, what goes before its value, and
+        #: the value that is left out.
+        self._fields = [_wire_form(fields[index], sizes[index]) for index in order]
         self._time = places["time_unix_ns"][1]
 
     def pack(self, record: bytes) -> bytes:
         """Return the serialised ArmState of a tick; what is zero or not known is left out."""
         written: list[bytes] = []
         values = self._in_order(self._unpack(record))
-        for (kind, tag), value in zip(self._fields, values, strict=True):
+        for (kind, tag, left_out), value in zip(self._fields, values, strict=True):
+            if value == left_out:
+                continue
             if kind == _VARINT:
-                if value:
-                    written += (tag, _SMALL[value] if value < 128 else varint(value))
-            elif kind == _FIXED64:
-                if value != _ZERO:
-                    written += (tag, value)
-            elif value[7] & 0x7F != 0x7F or not _is_unknown(value):  # nearly always finite
-                written += (tag, value)
+                written += (tag, _SMALL[value] if value < 128 else varint(value))
+            elif kind == _FIXED64 or value[7] & 0x7F != 0x7F or not _is_unknown(value):
+                written += (tag, value)  # an array's first number is nearly always finite
         return b"".join(written)
 
     def time_unix_ns(self, record: bytes) -> int:
@@ -82,14 +81,14 @@ def _code(field: Any, size: int) -> str:
     return f"{size}s"
 
 
-def _kind_and_tag(field: Any, size: int) -> tuple[int, bytes]:
+def _wire_form(field: Any, size: int) -> tuple[int, bytes, object]:
     if field.is_repeated:
-        return _BYTES, varint(field.number << 3 | _BYTES) + varint(size)
-    kind = _VARINT if field.type in _WHOLE_NUMBERS else _FIXED64
-    return kind, varint(field.number << 3 | kind)
+        return _BYTES, varint(field.number << 3 | _BYTES) + varint(size), _NAN * (size // 8)
+    if field.type in _WHOLE_NUMBERS:
+        return _VARINT, varint(field.number << 3 | _VARINT), 0
+    return _FIXED64, varint(field.number << 3 | _FIXED64), _ZERO
 
 
 def _is_unknown(raw: bytes) -> bool:
-    """Say whether every number of an array is NaN."""
-    n = len(raw) // 8
-    return raw == _NAN * n or all(map(isnan, struct.unpack(f"<{n}d", raw)))
+    """Say whether every number of an array is NaN, of whatever bits."""
+    return all(map(isnan, struct.unpack(f"<{len(raw) // 8}d", raw)))
