@@ -21,7 +21,7 @@ from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import Configuration, log_directory
 from pneuarm.service.daemon.announce import Announcer, start_facts
 from pneuarm.service.daemon.info import info_of
-from pneuarm.service.daemon.local_stop import lock
+from pneuarm.service.daemon.local_stop import Callers, lock
 from pneuarm.service.daemon.repair import start_mending
 from pneuarm.service.daemon.sd_notify import ServiceManager
 from pneuarm.service.devices import registry as backends
@@ -55,6 +55,7 @@ class Supervisor:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
         self._say = say
         self._arm_lock = lock("arm", configuration.arm.name)
+        self._callers = Callers(self._arm_lock)
         backends.check(configuration)
         self._device_lock = lock("device", backends.address(configuration))
         self._check_ports(configuration)
@@ -267,28 +268,16 @@ class Supervisor:
     # --- the stop from this machine --------------------------------------------------------
 
     def _serve_local_stop(self, timeout_s: float) -> None:
-        watched: list[socket.socket | Pipe] = [self._arm_lock, self._control_pipe]
+        watched: list[socket.socket | Pipe] = [*self._callers.sockets(), self._control_pipe]
         readable, _, _ = select.select(watched, [], [], timeout_s)
-        if self._arm_lock in readable:
-            self._accept_stop()
+        for connection in self._callers.asking_to_stop(readable):
+            self._request_id += 2  # odd: the supervisor's
+            self._stop_asked[self._request_id] = connection
+            self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
         if self._control_pipe in readable:
             while (message := self._control_pipe.receive()) is not None:
                 if isinstance(message, ModeReply):
                     self._confirm(message)
-
-    def _accept_stop(self) -> None:
-        connection, _ = self._arm_lock.accept()
-        connection.settimeout(0.1)
-        try:
-            asked = connection.recv(16)
-        except OSError:
-            asked = b""
-        if not asked.startswith(b"estop"):
-            connection.close()
-            return
-        self._request_id += 2  # odd: the supervisor's
-        self._stop_asked[self._request_id] = connection
-        self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
 
     def _confirm(self, reply: ModeReply) -> None:
         connection = self._stop_asked.pop(reply.request_id, None)
