@@ -40,8 +40,9 @@ BODY = Topic("body", "file", PointCloud, logged_rate_hz=20.0)
 HEALTH = Topic("health", "out", pb.Health, rate_hz=1.0)
 EVENT = Topic("event", "out", pb.Event)
 INFO = Topic("info", "query", pb.Info)
+EVENTS = Topic("events", "query", pb.Events, logged=False)  # each of them is logged as `event`
 
-TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, BODY, HEALTH, EVENT, INFO)
+TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, BODY, HEALTH, EVENT, INFO, EVENTS)
 LOGGED = tuple(topic for topic in TOPICS if topic.logged)
 
 #: Liveliness tokens.

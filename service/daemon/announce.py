@@ -2,10 +2,10 @@
 
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 
 from pneuarm.logs.rings.rings import MessageReader, Rings
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.event_line import event_line
 from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import rerun_url
 from pneuarm.service.devices import registry as backends
@@ -71,17 +71,3 @@ class Announcer:
             self._withheld += 1
         else:
             self._say(event_line(event))
-
-
-def event_line(event: pb.Event) -> str:
-    """One event for a terminal: time, level, who, what, why, what to do."""
-    clock = datetime.fromtimestamp(event.time_unix_ns / 1e9, UTC).strftime("%H:%M:%S.%f")[:-3]
-    level = pb.Level.Name(event.level).lower()
-    line = f"{clock} {level:7} {event.source}: {event.text}"
-    if event.client_id:
-        line += f" [{event.client_id}]"
-    if event.cause:
-        line += f" (cause: {event.cause})"
-    if event.remedy:
-        line += f" -> {event.remedy}"
-    return line

@@ -33,6 +33,7 @@ from pneuarm.service.processes.device_slots import DeviceLink
 from pneuarm.service.processes.pipe import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from pneuarm.service.processes.shared import ENDING_SIGNALS, REALTIME, START_FAILED, Shared
 from pneuarm.service.processes.usage import ProcessTable
+from pneuarm.service.wire.tip_pose_source import read_key
 
 _PERIOD_S = 0.02
 
@@ -80,6 +81,7 @@ class Supervisor:
     @staticmethod
     def _check_ports(configuration: Configuration) -> None:
         read_config(configuration.zenoh.config_file)
+        read_key(configuration.feedback)
         for endpoint in configuration.zenoh.listen:
             check_free("zenoh.listen", endpoint)
         if configuration.rerun.enabled and configuration.rerun.start_server:

@@ -42,6 +42,22 @@ class FeedbackConfig(Table):
     dither_period_ms: Annotated[float, Field(ge=4, le=1000)] = 30.0
     hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.55
     hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.65
+    tip_pose_source: Annotated[
+        str,
+        Field(
+            max_length=64,
+            pattern=r"^[A-Za-z0-9_.-]*$",
+            description="the one publisher whose measured tip poses are taken, under the key "
+            "`sensor/tip_pose/<tip_pose_source>`; empty takes the first that publishes, and warns",
+        ),
+    ] = ""
+    tip_pose_key_file: Annotated[
+        str,
+        Field(
+            description="file with a secret of 16 bytes or more; each pose must then have the "
+            "HMAC-SHA256 of its payload attached, and a stamp that increases; empty: no signature"
+        ),
+    ] = ""
 
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""
