@@ -46,6 +46,7 @@ class Telling:
         key = (event.code, event.client_id, _NUMBER.sub("#", event.text))
         lasting = self._lasting.get(key)
         if changed or (lasting is None and self._is_room(event.time_unix_ns)):
+            event.repeats = lasting.repeats + 1 if lasting and lasting.repeats else 0
             self._lasting[key] = _Lasting(event.time_unix_ns)
             self._write(event)
         elif lasting is None:

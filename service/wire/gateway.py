@@ -156,7 +156,13 @@ class Gateway:
         self._ask_to_stop()
 
     def _on_estop_query(self, query: zenoh.Query) -> None:
-        """Stop, and answer when control has: with what was sent, so that it is no old answer."""
+        """Stop, and answer when control has: with what was sent, so that it is no old answer.
+
+        Who asks a wildcard for whatever there is does not mean the stop.
+        """
+        if not str(query.key_expr).endswith(ESTOP.key):
+            query.drop()
+            return
         with self._request_lock:
             number = self._ask_to_stop()
             payload = b"" if query.payload is None else query.payload.to_bytes()
@@ -299,7 +305,7 @@ class Gateway:
                 self._requests.send(Heartbeat(operator=self._lease.has_operator(now_s)))
             for health in self._publisher.step(
                 now_s,
-                self._notes.rejected,
+                self._notes.refused,
                 self._requests.dropped + self._stream.dropped,
                 self._lease.holder,
             ):

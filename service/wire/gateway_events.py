@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import Counter
 
 from google.protobuf.message import Message
 
@@ -29,8 +30,9 @@ class Notes:
         self._messages = MessageWriter(shared.rings.gateway)
         # What strangers make of refusals does not hide those of the lease's holder.
         self._holders, self._strangers = Telling(self._write), Telling(self._write)
-        self._unread: dict[str, int] = {}
-        self._unread_told_ns = 0
+        self._skipped: Counter[str] = Counter()  # a key is counted by its own thread only
+        self._skips_told: Counter[str] = Counter()
+        self._skips_told_ns = 0
 
     def log(self, topic: Topic, message: Message, monotonic_ns: int) -> None:
         """Write down a message that was accepted, or one of our own."""
@@ -47,10 +49,13 @@ class Notes:
             self.tell("rejected", f"{key}: {reason}", client, shown, holder=holder)
 
     def skip(self, key: str) -> None:
-        """Count a message that was not even read; :meth:`step` tells of them."""
-        with self.lock:
-            self.rejected += 1
-            self._unread[key] = self._unread.get(key, 0) + 1
+        """Count a message that was not even read, without a lock; :meth:`step` tells of them."""
+        self._skipped[key] += 1
+
+    @property
+    def refused(self) -> int:
+        """Messages that changed nothing, read or not."""
+        return self.rejected + self._skipped.total()
 
     def tell(
         self, code: str, text: str, client: str, payload: bytes = b"", *, holder: bool = False
@@ -73,21 +78,22 @@ class Notes:
         """Tell what was counted and is due."""
         now_ns = self._shared.unix_ns(time.monotonic_ns())
         with self.lock:
-            if self._unread and now_ns - self._unread_told_ns >= 1_000_000_000:
-                self._unread_told_ns = now_ns
-                self._tell_unread()
+            if now_ns - self._skips_told_ns >= 1_000_000_000:
+                self._skips_told_ns = now_ns
+                self._tell_skips()
             self._holders.step(now_ns)
             self._strangers.step(now_ns)
 
-    def _tell_unread(self) -> None:
-        for key, number in self._unread.items():
+    def _tell_skips(self) -> None:
+        skipped = Counter(self._skipped)
+        for key, number in (skipped - self._skips_told).items():
             self.tell(
                 "rejected",
                 f"{key}: {number} messages were not read: those before them cost more computing "
                 "time than they may; send fewer, or smaller ones",
                 "",
             )
-        self._unread.clear()
+        self._skips_told = skipped
 
     def _write(self, event: pb.Event) -> None:
         self._messages.write(EVENT, event, event.time_unix_ns)

@@ -5,8 +5,7 @@ hold it share one allowance of computing time, the holder has one of its own.
 """
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -96,26 +95,17 @@ class Inbox:
         received_ns = time.monotonic_ns()
         payload = sample.payload.to_bytes()
         holder = self._lease.is_proved_by(payload)
-        message = pb.Target()
-        with self._charged(TARGET.key, self._holders if holder else self._strangers) as may_read:
-            if not may_read:
-                return
-            try:
-                message = decode(pb.Target, payload, str(sample.encoding))
-                self._take_target(message, received_ns)
-            except TargetRejected as error:
-                who = message.client_id
-                self._notes.reject(TARGET.key, str(error), payload, who, holder=holder)
-
-    @contextmanager
-    def _charged(self, key: str, allowance: Allowance) -> Iterator[bool]:
-        """Charge what is done to an allowance; yield whether there was anything left of it."""
-        now_s, begun_s = time.monotonic(), time.thread_time()
-        may_read = allowance.left(now_s) > 0.0
-        if not may_read:
-            self._notes.skip(key)
+        allowance = self._holders if holder else self._strangers
+        now_s, message = received_ns * 1e-9, pb.Target()
+        if allowance.left(now_s) <= 0.0:
+            self._notes.skip(TARGET.key)
+            return
+        begun_s = time.thread_time()
         try:
-            yield may_read
+            message = decode(pb.Target, payload, str(sample.encoding))
+            self._take_target(message, received_ns)
+        except TargetRejected as error:
+            self._notes.reject(TARGET.key, str(error), payload, message.client_id, holder=holder)
         finally:
             allowance.spend(time.thread_time() - begun_s, now_s)
 
@@ -204,14 +194,17 @@ class Inbox:
 
     def _take_pose(self, sample: zenoh.Sample, source: str, allowance: Allowance) -> None:
         received_ns = time.monotonic_ns()
-        with self._charged(TIP_POSE.key, allowance) as may_read:
-            if not may_read:
-                return
-            payload = sample.payload.to_bytes()
-            try:
-                self._check_pose(sample, payload, source, received_ns)
-            except TargetRejected as error:
-                self._notes.reject(TIP_POSE.key, str(error), payload, source)
+        now_s = received_ns * 1e-9
+        if allowance.left(now_s) <= 0.0:
+            self._notes.skip(TIP_POSE.key)
+            return
+        payload, begun_s = sample.payload.to_bytes(), time.thread_time()
+        try:
+            self._check_pose(sample, payload, source, received_ns)
+        except TargetRejected as error:
+            self._notes.reject(TIP_POSE.key, str(error), payload, source)
+        finally:
+            allowance.spend(time.thread_time() - begun_s, now_s)
 
     def _check_pose(
         self, sample: zenoh.Sample, payload: bytes, source: str, received_ns: int

@@ -8,6 +8,7 @@ heard once can be said again. Pure; the time is an argument.
 
 import hashlib
 import hmac
+from math import inf
 from pathlib import Path
 
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
@@ -60,7 +61,7 @@ class TipPoseSource:
         self.name = name
         self._key = key
         self._newest = ""
-        self._heard_s = -SILENT_S
+        self._heard_s = -inf
         self._stamp_ns: int | None = None
 
     def may_be(self, source: str) -> bool:

@@ -124,15 +124,16 @@ REQUESTS = {
 }
 
 
+@pytest.mark.parametrize("key", ["cmd/mode", "cmd/*", "**", "*/mode"])
 @pytest.mark.parametrize("request_name", REQUESTS)
 @pytest.mark.parametrize("name", ["watcher", "mocap", "stranger"])
 def test_others_ask_for_nothing(
-    daemon: SecuredDaemon, operator: Client, name: str, request_name: str
+    daemon: SecuredDaemon, operator: Client, name: str, request_name: str, key: str
 ) -> None:
     operator.enable()
     payload = REQUESTS[request_name].SerializeToString()
     with rogue(daemon, name) as session:
-        replies = session.get(daemon.key("cmd/mode"), payload=payload, timeout=QUIET_S)
+        replies = session.get(daemon.key(key), payload=payload, timeout=QUIET_S)
         assert [reply for reply in replies if reply.ok is not None] == []
     assert operator.state().mode == pb.ACTIVE
     assert operator.take_lease().lease_holder == operator.client_id
@@ -224,6 +225,29 @@ def test_nobody_listens_to_what_others_command(
         operator.release()
         assert [key for key in heard if "/cmd/" in key] == []
         subscriber.undeclare()
+
+
+@pytest.mark.parametrize("key", ["cmd/estop", "cmd/*", "**"])
+def test_a_stranger_with_a_certificate_stops_nothing(
+    daemon: SecuredDaemon, operator: Client, key: str
+) -> None:
+    """The stop is for everybody who has a part; a certificate without one has none."""
+    operator.enable()
+    with rogue(daemon, "stranger") as session:
+        session.put(daemon.key(key), b"stop")
+        list(session.get(daemon.key(key), payload=b"stop", timeout=QUIET_S))
+    assert operator.state().mode == pb.ACTIVE
+
+
+def test_the_watcher_ends_nobodys_lease(daemon: SecuredDaemon, operator: Client) -> None:
+    """A liveliness token of the holder's name that goes would take the lease along."""
+    operator.enable()
+    with rogue(daemon, "watcher") as session:
+        key = daemon.key(f"alive/client/{operator.client_id}")
+        session.liveliness().declare_token(key).undeclare()
+        time.sleep(QUIET_S)
+    assert operator.state().mode == pb.ACTIVE
+    assert operator.take_lease().lease_holder == operator.client_id
 
 
 def pose(x: float) -> bytes:
