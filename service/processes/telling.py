@@ -18,6 +18,11 @@ _MOST_IN_A_SECOND = 20
 _NUMBER = re.compile(r"[-+]?(\d[\d.]*(e[-+]?\d+)?|\bnan\b|\binf\b)")
 
 
+def sameness(event: pb.Event) -> tuple[str, str, str]:
+    """Return what two events have in common that say the same."""
+    return event.code, event.client_id, _NUMBER.sub("#", event.text)
+
+
 @dataclass
 class _Lasting:
     told_ns: int
@@ -43,7 +48,7 @@ class Telling:
     def tell(self, event: pb.Event) -> None:
         """Take an event; its ``time_unix_ns`` is now."""
         changed, self._mode = event.mode != self._mode, event.mode
-        key = (event.code, event.client_id, _NUMBER.sub("#", event.text))
+        key = sameness(event)
         lasting = self._lasting.get(key)
         if changed or (lasting is None and self._is_room(event.time_unix_ns)):
             event.repeats = lasting.repeats + 1 if lasting and lasting.repeats else 0
