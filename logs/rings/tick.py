@@ -1,9 +1,8 @@
 """The record of one tick: an ArmState as a fixed-size numpy record, and both ways between them.
 
-`schema/pneuarm.proto` is the only definition. A repeated field of ArmState becomes an array whose
-size follows from its name: a position, velocity or offset has 3 elements, an orientation
-4, all others one a chamber.
-An unknown array is NaN in the record and empty in the message.
+`schema/pneuarm.proto` is the only definition. A repeated field of ArmState becomes an array of as
+many elements as its option `elements` says, without that option of one a chamber. An unknown array
+is NaN in the record and empty in the message.
 """
 
 from functools import cache
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
 
+from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.pneuarm_pb2 import ArmState
 
 _TYPES = {
@@ -24,25 +24,18 @@ _TYPES = {
 }
 
 
-#: Endings of the names of vectors of the tip.
-_VECTORS = ("position_m", "velocity_m_s", "offset_m")
-
-
-def _size(field: Any, n_sections: int) -> tuple[int, ...]:
+def _shape(field: Any, n_sections: int) -> tuple[int, ...]:
     if not field.is_repeated:
         return ()
-    if field.name.endswith(_VECTORS):
-        return (3,)
-    if field.name.endswith("orientation_xyzw"):
-        return (4,)
-    return (n_sections, 3)
+    elements = field.GetOptions().Extensions[pb.elements]
+    return (elements,) if elements else (n_sections, 3)
 
 
 @cache
 def tick_dtype(n_sections: int) -> np.dtype[np.void]:
     """Record type of a tick of an arm with ``n_sections`` sections."""
     fields = [
-        (field.name, _TYPES[field.type], _size(field, n_sections))
+        (field.name, _TYPES[field.type], _shape(field, n_sections))
         for field in ArmState.DESCRIPTOR.fields
     ]
     return np.dtype(fields)

@@ -6,7 +6,7 @@ from google.protobuf import json_format
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.unknown_fields import UnknownFieldSet
 
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected
 from pneuarm.logs.schema.printable import printable
 
 #: No message of ours comes near this size.
@@ -29,19 +29,19 @@ def is_json(encoding: str) -> bool:
 
 
 def decode(message_type: type[M], payload: bytes, encoding: str, *, tolerant: bool = False) -> M:
-    """Read a message; raises TargetRejected with one sentence for anything that is not one.
+    """Read a message; raises MessageRejected with one sentence for anything that is not one.
 
     What the daemon takes may hold nothing that it does not know. What it gives is read
     ``tolerant``, so that a newer daemon may say more than an older client knows.
     """
     name = message_type.DESCRIPTOR.full_name
     if len(payload) > MAX_PAYLOAD_BYTES and not tolerant:
-        raise TargetRejected(
+        raise MessageRejected(
             f"payload of {len(payload)} bytes; at most {MAX_PAYLOAD_BYTES} are read"
         )
     schema = encoding.partition(";")[2]
     if schema and schema != name:
-        raise TargetRejected(f"message of type {schema[:100]!r}; this key takes {name}")
+        raise MessageRejected(f"message of type {schema[:100]!r}; this key takes {name}")
     message = message_type()
     try:
         if is_json(encoding):
@@ -51,9 +51,9 @@ def decode(message_type: type[M], payload: bytes, encoding: str, *, tolerant: bo
     except (json_format.Error, DecodeError, ValueError, RecursionError) as error:
         kind = "JSON" if is_json(encoding) else "protobuf"
         detail = printable((str(error).splitlines() or [""])[0], 200)
-        raise TargetRejected(f"payload is not the {kind} form of {name}: {detail}") from error
+        raise MessageRejected(f"payload is not the {kind} form of {name}: {detail}") from error
     if not tolerant and _has_unknown_fields(message):
-        raise TargetRejected(
+        raise MessageRejected(
             f"payload has fields that {name} does not have; a message of another type, or of a "
             "newer client than this daemon?"
         )

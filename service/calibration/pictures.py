@@ -8,6 +8,7 @@ import numpy as np
 
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.excitation import place
+from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.calibration.values import errors_mm
 from pneuarm.service.configuration.tables.table import BAR, MM
 
@@ -44,16 +45,11 @@ def pictures(calibration: Calibration) -> dict[str, bytes]:
 def _picture(
     draw: Callable[[Any, Calibration], None], calibration: Calibration, size: tuple[float, float]
 ) -> bytes:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure = pyplot.figure(figsize=size, dpi=110, layout="constrained")
+    figure = pyplot().figure(figsize=size, dpi=110, layout="constrained")
     draw(figure, calibration)
     png = BytesIO()
     figure.savefig(png, format="png")
-    pyplot.close(figure)
+    pyplot().close(figure)
     return png.getvalue()
 
 

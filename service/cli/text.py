@@ -1,6 +1,7 @@
 """States for people: millimetres, degrees and bar."""
 
 import math
+from collections.abc import Iterable
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.printable import name_of
@@ -8,14 +9,14 @@ from pneuarm.logs.schema.printable import name_of
 _LIMITS = ((1, "length, Eq. (4)"), (2, "bend"), (4, "pressure"), (8, "keep-out"))
 
 
-def millimetres(values_m: "list[float] | object") -> str:
+def millimetres(values_m: Iterable[float]) -> str:
     """Format metres as millimetres."""
-    return "(" + ", ".join(f"{1e3 * value:.1f}" for value in values_m) + ")"  # type: ignore
+    return "(" + ", ".join(f"{1e3 * value:.1f}" for value in values_m) + ")"
 
 
-def bars(values_pa: "list[float] | object") -> str:
+def bars(values_pa: Iterable[float]) -> str:
     """Format pascal as bar."""
-    return "(" + ", ".join(f"{1e-5 * value:+.3f}" for value in values_pa) + ")"  # type: ignore
+    return "(" + ", ".join(f"{1e-5 * value:+.3f}" for value in values_pa) + ")"
 
 
 def binding(flags: int) -> str:

@@ -20,7 +20,9 @@ from google.protobuf.message import DecodeError, Message
 from pneuarm.controllers.arm.errors import (
     DaemonUnreachable,
     LeaseRefused,
+    MessageRejected,
     ModeRefused,
+    MoveTimeout,
     NotConfirmed,
     PneuarmError,
     TargetRejected,
@@ -61,6 +63,11 @@ _URGENT: dict[str, Any] = {
     "express": True,
 }
 
+_REFUSALS: dict[int, type[PneuarmError]] = {
+    pb.BAD_REQUEST: MessageRejected,
+    pb.LEASE_REFUSED: LeaseRefused,
+}
+
 M = TypeVar("M", bound=Message)
 
 
@@ -79,7 +86,7 @@ def new_client_id(name: str = "") -> str:
 def _versions_apart(daemons: str) -> str:
     """Say so where daemon and client are of different versions."""
     try:
-        own = version("pneuarm")
+        own = version("pneuarm-client")
     except PackageNotFoundError:
         return ""
     if not daemons or daemons == own:
@@ -202,7 +209,7 @@ class Client:
         self._check_process()
         found = []
         while (sample := self._events.try_recv()) is not None:
-            with contextlib.suppress(TargetRejected):  # no event: not the daemon's
+            with contextlib.suppress(MessageRejected):  # no event: not the daemon's
                 payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
                 found.append(decode(pb.Event, payload, encoding, tolerant=True))
         return found
@@ -240,7 +247,8 @@ class Client:
         )
         for reply in replies:
             source = reply.replier_id
-            if source is None or source.zid not in self._session.info.routers_zid():
+            zid = getattr(source, "zid", source)  # older versions of Zenoh return it itself
+            if zid not in self._session.info.routers_zid():
                 continue
             if reply.ok is None:
                 raise DaemonUnreachable(printable(reply.err.payload.to_string()))
@@ -269,8 +277,7 @@ class Client:
         if reply.lease_secret:
             self._secret = reply.lease_secret
         if not reply.accepted:
-            held_by_other = reply.lease_holder not in ("", self.client_id)
-            raise (LeaseRefused if held_by_other else ModeRefused)(
+            raise _REFUSALS.get(reply.refusal, ModeRefused)(
                 printable(reply.reason) + _versions_apart(reply.version)
             )
         self._wait_for(reply.state_sequence)
@@ -325,7 +332,7 @@ class Client:
         except DaemonUnreachable as error:
             raise NotConfirmed(f"NOT CONFIRMED: {error}; cut the air supply") from error
         nonce, until = os.urandom(16), time.monotonic() + timeout_s
-        with contextlib.suppress(DaemonUnreachable, TargetRejected, zenoh.ZError):
+        with contextlib.suppress(DaemonUnreachable, MessageRejected, zenoh.ZError):
             self._session.put(self._key(ESTOP), nonce, **_URGENT)
             while (left_s := until - time.monotonic()) > 0.0:
                 for reply in self._ask(
@@ -407,8 +414,7 @@ class Client:
         """Refresh a target until the arm has reached it, and return the state that says so.
 
         A target out of reach ends the wait too: the state's ``reach`` tells, ``binding_limits``
-        why. Raises TargetRejected, ModeRefused when the arm stops following, or NotConfirmed
-        after the timeout.
+        why. Raises TargetRejected, ModeRefused when the arm stops following, or MoveTimeout.
         """
         self.events()
         first = self.send(target)
@@ -423,7 +429,9 @@ class Client:
             if state.target_sequence >= first and state.reach in (pb.REACHED, pb.OUT_OF_REACH):
                 return state
             self.send(target)
-        raise NotConfirmed(f"not reached within {timeout_s:g} s")
+        raise MoveTimeout(
+            f"not reached within {timeout_s:g} s; the arm holds on its way there: give it longer"
+        )
 
     def raise_if_refused(self, first: int = 0) -> None:
         """Raise TargetRejected if the daemon has refused a target of this client's.
@@ -431,20 +439,7 @@ class Client:
         Targets before number ``first`` do not count: their refusals may come late.
         """
         for event in self.events():
-            ours = event.code == "rejected" and event.client_id == self.client_id
             # A refused request was raised by its own call; its event may come after that.
-            if not ours or not event.text.startswith(TARGET.key):
-                continue
-            if self._number_of(event.payload) >= first:
+            ours = event.client_id == self.client_id and event.key == TARGET.key
+            if ours and event.code == "rejected" and event.target_sequence >= first:
                 raise TargetRejected(printable(event.text))
-
-    def _number_of(self, payload: bytes) -> int:
-        """Sequence number of a target of this client's, of which only the beginning is there."""
-        head = pb.Target(client_id=self.client_id, lease_secret=self._secret)
-        number = shift = 0
-        for byte in payload[head.ByteSize() + 1 :]:  # after the field's tag: a varint
-            number |= (byte & 0x7F) << shift
-            shift += 7
-            if byte < 0x80:
-                break
-        return number

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import tomli_w
 from platformdirs import user_state_path
-from pydantic import BaseModel, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from pneuarm.controllers.arm.arm import Arm, uncalibrated
 from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
@@ -37,7 +37,9 @@ PRESETS = ("paper", "table1", "trunk")
 class Configuration(Table):
     """Everything the daemon is told."""
 
-    preset: Literal["paper", "table1", "trunk"] = "paper"
+    preset: Annotated[
+        Literal["paper", "table1", "trunk"], Field(description="built-in arm below this file")
+    ] = "paper"
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
     reference: ReferenceConfig = ReferenceConfig()

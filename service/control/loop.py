@@ -24,6 +24,7 @@ from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import new_tick
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.control.steering import Steering
 from pneuarm.service.modes.mode import VENTED_MODES, Mode, ModeEvent
 from pneuarm.service.modes.mode_keeper import ModeKeeper, Timeouts, Watched
@@ -36,7 +37,6 @@ from pneuarm.service.processes.pipe import (
     SetTarget,
     SetTipPose,
 )
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 from pneuarm.service.safety.monitors.watch import measurement_age_s
 from pneuarm.service.safety.safety import Safety
 

@@ -101,7 +101,7 @@ class Announcer:
         second = int(time.monotonic())
         if second != self._second:
             if self._withheld:
-                self._say(f"({self._withheld} more events; all of them are in the log)")
+                self._say(f"({self._withheld} more events, not shown here)")
             self._second, self._lines, self._withheld = second, 0, 0
         self._lines += 1
         if self._lines > _LINES_PER_S and event.level != pb.ERROR:

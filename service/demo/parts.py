@@ -10,7 +10,7 @@ from pneuarm.service.configuration.configuration import Configuration
 
 
 @dataclass(frozen=True)
-class Part:
+class DemoPart:
     """One daemon's run. ``seconds`` says how long each phase lasts; ``camera``: the tip is seen."""
 
     name: str
@@ -40,12 +40,12 @@ def _free_port() -> int:
         return port
 
 
-def parts(configuration: Configuration, seconds: float) -> list[Part]:
+def parts(configuration: Configuration, seconds: float) -> list[DemoPart]:
     """Return what is shown in about ``seconds`` of drawing."""
     if configuration.hardware.adapter != "simulator":
         whole = {"circle": 0.45 * seconds, "eight": 0.45 * seconds, "out of reach": 1.0}
         caption = "through the emulated device: its true tip is not known"
-        return [Part("device", caption, lambda: configuration, False, whole)]
+        return [DemoPart("device", caption, lambda: configuration, False, whole)]
     found: list[Configuration] = []
 
     def calibrated() -> Configuration:
@@ -56,9 +56,9 @@ def parts(configuration: Configuration, seconds: float) -> list[Part]:
 
     eight = {"eight": 0.25 * seconds}
     return [
-        Part("uncalibrated", "1 uncalibrated", lambda: configuration, False, eight),
-        Part("calibrated", "2 calibrated", calibrated, False, eight),
-        Part(
+        DemoPart("uncalibrated", "1 uncalibrated", lambda: configuration, False, eight),
+        DemoPart("calibrated", "2 calibrated", calibrated, False, eight),
+        DemoPart(
             "feedback",
             "3 calibrated, tip measured",
             calibrated,

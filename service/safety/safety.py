@@ -7,12 +7,12 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.interface import Measurement
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.modes.mode_keeper import ModeKeeper
 from pneuarm.service.processes.pipe import SetTipPose
 from pneuarm.service.safety.fault_keeper import FaultKeeper
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 from pneuarm.service.safety.monitors.tip_model import TipModel
 from pneuarm.service.safety.monitors.watch import Watch
 from pneuarm.service.safety.ramp import Ramp

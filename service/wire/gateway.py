@@ -19,7 +19,7 @@ from typing import Any, cast
 
 import zenoh
 
-from pneuarm.controllers.arm.errors import LeaseRefused, TargetRejected
+from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode
 from pneuarm.logs.schema.printable import printable
@@ -124,9 +124,7 @@ class Gateway:
             return serve(declare, last_resort(work, partial(self._refuse, key)), _WAITING)
 
         def heed(work: Callable[[Any], None]) -> Any:
-            return at_once(
-                last_resort(work, lambda sample, why: self._notes.reject("", why, b"", ""))
-            )
+            return at_once(last_resort(work, lambda sample, why: self._notes.reject("", why)))
 
         return [
             session.declare_subscriber(stop, heed(self._on_estop)),
@@ -144,12 +142,12 @@ class Gateway:
 
     def _refuse(self, key: str, query: zenoh.Query, why: str) -> None:
         """Answer a query that could not be handled: one sentence to who asked, and to the log."""
-        self._notes.reject(key, why, b"", "")
+        self._notes.reject(key, why)
         with query, suppress(zenoh.ZError):
             query.reply_err(f"{key}: {why}")
 
     def _refuse_at_once(self, item: zenoh.Sample | zenoh.Query, why: str) -> None:
-        self._notes.reject(str(item.key_expr).split("/", 2)[-1], why, b"", "")
+        self._notes.reject(str(item.key_expr).split("/", 2)[-1], why)
 
     def _on_estop(self, sample: zenoh.Sample) -> None:
         """Stop, whatever was sent and whoever sent it; asked again until control has answered."""
@@ -197,22 +195,23 @@ class Gateway:
             request = decode(pb.ModeRequest, payload, str(query.encoding))
             self._check_request(request, holder)
             self._handle(request, asked)
-        except (TargetRejected, LeaseRefused) as error:
-            self._notes.reject(MODE.key, str(error), b"", request.client_id, holder=holder)
-            self._reply(asked, self._state_reply(False, printable(str(error)), ""))
+        except (MessageRejected, LeaseRefused) as error:
+            self._notes.reject(MODE.key, str(error), request.client_id, holder=holder)
+            refusal = pb.LEASE_REFUSED if isinstance(error, LeaseRefused) else pb.BAD_REQUEST
+            self._reply(asked, self._state_reply(refusal, printable(str(error)), ""))
 
     def _check_request(self, request: pb.ModeRequest, holder: bool) -> None:
         """Raise for an unknown action, a name that cannot be told, or too many requests."""
         if request.action not in pb.Action.values()[1:]:
             names = ", ".join(pb.Action.keys()[1:])
-            raise TargetRejected(f"action = {request.action}: missing or unknown; one of {names}")
+            raise MessageRejected(f"action = {request.action}: missing or unknown; one of {names}")
         if request.client_id:
             check_name(request.client_id)
         allowance = self._allowances.setdefault(
             (request.action, holder), Allowance(_REQUESTS_PER_S)
         )
         if not allowance.take(time.monotonic()):
-            raise TargetRejected(
+            raise MessageRejected(
                 f"too many requests: {_REQUESTS_PER_S:g} a second are taken for "
                 f"{pb.Action.Name(request.action)}"
             )
@@ -234,7 +233,7 @@ class Gateway:
         if event is not None:
             self._request(event, request.client_id, replace(asked, secret=secret))
         else:
-            self._reply(asked, self._state_reply(True, "", secret))
+            self._reply(asked, self._state_reply(pb.NOT_REFUSED, "", secret))
 
     def _request(self, event: ModeEvent, client: str, asked: _Asked | None = None) -> int:
         """Pass an event to control, return its number; the reply goes to the query that asked."""
@@ -247,12 +246,13 @@ class Gateway:
                 del self._pending[number]
         if not sent and asked is not None:
             why = "the control process does not answer"
-            self._reply(asked, self._state_reply(False, why, asked.secret))
+            self._reply(asked, self._state_reply(pb.MODE_REFUSED, why, asked.secret))
         return number
 
-    def _state_reply(self, accepted: bool, reason: str, secret: str) -> pb.Reply:
+    def _state_reply(self, refusal: "pb.Refusal", reason: str, secret: str) -> pb.Reply:
         return pb.Reply(
-            accepted=accepted,
+            accepted=refusal == pb.NOT_REFUSED,
+            refusal=refusal,
             reason=reason,
             lease_secret=secret,
             lease_holder=self._lease.holder,
@@ -284,7 +284,8 @@ class Gateway:
     def _pass_on(self, reply: ModeReply, asked: _Asked) -> None:
         stopped = asked.nonce is not None and reply.mode == Mode.ESTOP
         reason = "" if stopped else reply.reason
-        message = self._state_reply(reply.accepted or stopped, reason, asked.secret)
+        refusal = pb.NOT_REFUSED if reply.accepted or stopped else pb.MODE_REFUSED
+        message = self._state_reply(refusal, reason, asked.secret)
         message.mode = cast("pb.Mode", int(reply.mode))
         message.state_sequence, message.nonce = reply.sequence, asked.nonce or b""
         self._publisher.newest_mode = message.mode

@@ -40,13 +40,22 @@ class Notes:
             self._messages.write(topic, message, self._shared.unix_ns(monotonic_ns))
 
     def reject(
-        self, key: str, reason: str, payload: bytes, client: str, *, holder: bool = False
+        self,
+        key: str,
+        reason: str,
+        client: str = "",
+        payload: bytes = b"",
+        target_sequence: int = 0,
+        *,
+        holder: bool = False,
     ) -> None:
         """Tell why a message changed nothing; ``holder``: it proved to be the lease's holder's."""
+        event = self._warning("rejected", f"{key}: {reason}", client)
+        event.key, event.target_sequence = key, target_sequence
         with self.lock:
             self.rejected += 1
-            shown = self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES]
-            self.tell("rejected", f"{key}: {reason}", client, shown, holder=holder)
+            event.payload = self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES]
+            (self._holders if holder else self._strangers).tell(event)
 
     def skip(self, key: str) -> None:
         """Count a message that was not even read, without a lock; :meth:`step` tells of them."""
@@ -57,11 +66,13 @@ class Notes:
         """Messages that changed nothing, read or not."""
         return self.rejected + self._skipped.total()
 
-    def tell(
-        self, code: str, text: str, client: str, payload: bytes = b"", *, holder: bool = False
-    ) -> None:
-        """Write down a warning, for everybody to read; what repeats is counted."""
-        event = pb.Event(
+    def tell(self, code: str, text: str, client: str) -> None:
+        """Write down a warning about what the lease's holder, or a source, does."""
+        with self.lock:
+            self._holders.tell(self._warning(code, text, client))
+
+    def _warning(self, code: str, text: str, client: str) -> pb.Event:
+        return pb.Event(
             time_unix_ns=self._shared.unix_ns(time.monotonic_ns()),
             level=pb.WARNING,
             source="gateway",
@@ -69,10 +80,7 @@ class Notes:
             text=printable(text),
             client_id=printable(client, 64),
             mode=self._publisher.newest_mode,
-            payload=payload,
         )
-        with self.lock:
-            (self._holders if holder else self._strangers).tell(event)
 
     def step(self) -> None:
         """Tell what was counted and is due."""
@@ -87,12 +95,14 @@ class Notes:
     def _tell_skips(self) -> None:
         skipped = Counter(self._skipped)
         for key, number in (skipped - self._skips_told).items():
-            self.tell(
+            event = self._warning(
                 "rejected",
                 f"{key}: {number} messages were not read: those before them cost more computing "
                 "time than they may; send fewer, or smaller ones",
                 "",
             )
+            event.key = key
+            self._strangers.tell(event)
         self._skips_told = skipped
 
     def _write(self, event: pb.Event) -> None:

@@ -14,7 +14,7 @@ import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 from pneuarm.controllers.workspace.reachability import Reachability
 from pneuarm.controllers.workspace.workspace import Workspace
@@ -88,7 +88,7 @@ class Inbox:
         return subscribed
 
     def _refuse(self, key: str, sample: zenoh.Sample, why: str) -> None:
-        self._notes.reject(key, why, sample.payload.to_bytes(), "")
+        self._notes.reject(key, why, payload=sample.payload.to_bytes())
 
     def on_target(self, sample: zenoh.Sample) -> None:
         """Take a target from who holds the lease."""
@@ -104,8 +104,9 @@ class Inbox:
         try:
             message = decode(pb.Target, payload, str(sample.encoding))
             self._take_target(message, received_ns)
-        except TargetRejected as error:
-            self._notes.reject(TARGET.key, str(error), payload, message.client_id, holder=holder)
+        except MessageRejected as error:
+            who, number = message.client_id, message.sequence
+            self._notes.reject(TARGET.key, str(error), who, payload, number, holder=holder)
         finally:
             allowance.spend(time.thread_time() - begun_s, now_s)
 
@@ -156,7 +157,6 @@ class Inbox:
             f"the target is out of reach: {names} binds; the nearest reachable point is "
             f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
             client,
-            holder=True,
         )
 
     def _check_fresh(self, state_sequence: int) -> None:
@@ -201,8 +201,8 @@ class Inbox:
         payload, begun_s = sample.payload.to_bytes(), time.thread_time()
         try:
             self._check_pose(sample, payload, source, received_ns)
-        except TargetRejected as error:
-            self._notes.reject(TIP_POSE.key, str(error), payload, source)
+        except MessageRejected as error:
+            self._notes.reject(TIP_POSE.key, str(error), source, payload)
         finally:
             allowance.spend(time.thread_time() - begun_s, now_s)
 

@@ -3,7 +3,7 @@
 import secrets
 from dataclasses import dataclass
 
-from pneuarm.controllers.arm.errors import LeaseRefused, TargetRejected
+from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected, TargetRejected
 from pneuarm.logs.schema.printable import printable
 
 #: No key can hold these: a client's name is a part of its liveliness token's.
@@ -12,14 +12,14 @@ _LONGEST_NAME = 64
 
 
 def check_name(client: str) -> None:
-    """Raise LeaseRefused for a client_id that cannot be told to people, or not be in a key."""
+    """Raise MessageRejected for a client_id that cannot be told to people, or not be in a key."""
     if not 1 <= len(client) <= _LONGEST_NAME:
-        raise LeaseRefused(
+        raise MessageRejected(
             f"client_id has {len(client)} characters; it names who holds the arm, by 1 to "
             f"{_LONGEST_NAME} characters"
         )
     if not client.isprintable() or not _NOT_IN_A_NAME.isdisjoint(client):
-        raise LeaseRefused(
+        raise MessageRejected(
             f"client_id = '{printable(client)}': printable characters without "
             f"{' '.join(sorted(_NOT_IN_A_NAME))} are allowed"
         )

@@ -60,4 +60,4 @@ def serve(declare: Callable[[Any], Iterable[T]], work: Callable[[T], None], size
 
 def at_once(work: Callable[[T], None]) -> Any:
     """Return a handler that works on Zenoh's own thread: for the stop, which waits for nobody."""
-    return zenoh.handlers.Callback(work, indirect=False)
+    return zenoh.handlers.Callback(work, lambda: None, indirect=False)

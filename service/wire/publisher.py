@@ -14,14 +14,25 @@ from pneuarm.logs.rings.rings import MessageReader
 from pneuarm.logs.rings.tick import state_from_tick, tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
-from pneuarm.logs.schema.topics import EVENT, EVENTS, HEALTH, STATE, TF, TIP, Topic, full_key
+from pneuarm.logs.schema.topics import (
+    EVENT,
+    EVENTS,
+    HEALTH,
+    STATE,
+    TF,
+    TIP,
+    TOPICS,
+    Topic,
+    full_key,
+)
 from pneuarm.service.processes.shared import Shared
 from pneuarm.service.processes.usage import ProcessUsage
 from pneuarm.service.wire.answers import answer
 from pneuarm.service.wire.event_history import EventHistory
 
 _HEALTH_S = 1.0
-_LATEST = (STATE, TIP, TF, HEALTH)
+#: What the newest message of also answers queries.
+_LATEST = tuple(topic for topic in TOPICS if topic.newest)
 
 
 class Publisher:

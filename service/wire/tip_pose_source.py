@@ -13,7 +13,7 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
-from pneuarm.controllers.arm.errors import ConfigurationError, TargetRejected
+from pneuarm.controllers.arm.errors import ConfigurationError, MessageRejected
 from pneuarm.logs.schema.printable import printable
 from pneuarm.logs.schema.topics import TIP_POSE
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig
@@ -74,33 +74,35 @@ class TipPoseSource:
         return not self.name and not self._key
 
     def check_publisher(self, source: str, payload: bytes, attachment: bytes, now_s: float) -> None:
-        """Raise TargetRejected for a pose of somebody who is not believed."""
+        """Raise MessageRejected for a pose of somebody who is not believed."""
         if not self.may_be(source):
-            raise TargetRejected(
+            raise MessageRejected(
                 f"the tip pose comes from {_called(source)}; feedback.tip_pose_source takes those "
                 f"of '{self.name}' only, under {TIP_POSE.key}/{self.name}"
             )
         if self._key and not hmac.compare_digest(signature(self._key, payload), attachment):
-            raise TargetRejected(
+            raise MessageRejected(
                 "the tip pose is not signed with feedback.tip_pose_key_file: attach the "
                 "HMAC-SHA256 of its payload"
             )
         if source != self._newest and now_s - self._heard_s <= SILENT_S:
-            raise TargetRejected(
+            raise MessageRejected(
                 f"the tip pose comes from a second publisher, {_called(source)}, besides "
                 f"{_called(self._newest)}; only one may publish it: end the other, and this one "
                 f"is taken after {SILENT_S:g} s of silence, or name one by feedback.tip_pose_source"
             )
 
     def take(self, source: str, message: PoseInFrame, now_s: float) -> None:
-        """Raise TargetRejected for a pose that is not newer than the last, else count it."""
+        """Raise MessageRejected for a pose that is not newer than the last, else count it."""
         stamp_ns = _stamp_ns(message)
         if self._key and stamp_ns is None:
-            raise TargetRejected("timestamp is missing; a signed tip pose needs one that increases")
+            raise MessageRejected(
+                "timestamp is missing; a signed tip pose needs one that increases"
+            )
         counts = bool(self._key) or now_s - self._heard_s <= SILENT_S
         last_ns = self._stamp_ns
         if counts and stamp_ns is not None and last_ns is not None and stamp_ns <= last_ns:
-            raise TargetRejected(
+            raise MessageRejected(
                 "the tip pose is not newer than the one before: its time stamp is "
                 f"{(last_ns - stamp_ns) * 1e-9:.3g} s behind; is there a second publisher?"
             )
@@ -113,12 +115,12 @@ def _called(source: str) -> str:
 
 
 def _stamp_ns(message: PoseInFrame) -> int | None:
-    """Return the stamp, or None; raises TargetRejected for one that is no time."""
+    """Return the stamp, or None; raises MessageRejected for one that is no time."""
     if not message.HasField("timestamp"):
         return None
     seconds, nanos = message.timestamp.seconds, message.timestamp.nanos
     if not (_SECONDS[0] <= seconds <= _SECONDS[1] and 0 <= nanos < 1_000_000_000):
-        raise TargetRejected(
+        raise MessageRejected(
             f"timestamp = {seconds} s and {nanos} ns is no time; allowed: the years 1 to 9999, and "
             "0 to 999999999 ns"
         )

@@ -1,8 +1,8 @@
 """How long one whole step of the inverse kinematics takes, beside its peers, on one core.
 
     make bench-setup
-    .venv/bin/python tools/bench/ik.py --json
-    .venv/bin/python tools/bench/ik.py --reach --json     # the campaign of tools/bench/reach.py too
+    .venv/bin/python -m tools.bench.ik --json
+    .venv/bin/python -m tools.bench.ik --reach --json     # the campaign of tools/bench/reach.py too
 
 A step is what the loop calls: error, Jacobian, QP, solution, exact checks, verdict, by
 ``Controller.step``. Two motions: ``ik_us`` between random reachable positions, where most QPs are
@@ -17,9 +17,6 @@ import platform
 import statistics
 import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
@@ -28,6 +25,7 @@ from pneuarm.controllers.kinematics.constant_curvature import tip_transform
 from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.targets.targets import PositionTarget
+from tools.bench.ik_peers import peers_us
 from tools.rig.arms import paper_arm, random_lengths
 
 DT_S = 1e-3
@@ -85,11 +83,9 @@ class Candidate:
 def peers() -> dict[str, float] | None:
     """Medians of the peers, once; None where their packages are missing."""
     try:
-        from tools.bench.ik_peers import peers_us  # type: ignore[import-not-found]
-    except ImportError:
+        return peers_us()
+    except ModuleNotFoundError:
         return None
-    found: dict[str, float] = peers_us()
-    return found or None
 
 
 def figures(rounds: int) -> dict[str, object]:

@@ -1,6 +1,6 @@
 """The campaign behind the figures of reach: many targets, every limit watched at every step.
 
-    .venv/bin/python tools/bench/ik.py --reach --json
+    .venv/bin/python -m tools.bench.ik --reach --json
 
 Steps of 10 ms instead of 1 ms: the same laws and the same checks, in a tenth of the time. The whole
 campaign is drawn from one seed.
@@ -94,7 +94,7 @@ class Watch:
         )
 
         def least(values: Array) -> Array:
-            return values.reshape(len(lengths), -1).min(axis=1)
+            return np.asarray(values.reshape(len(lengths), -1).min(axis=1))
 
         left = {
             "length": least(
@@ -151,7 +151,7 @@ def reachable(arm: Arm, number: int, seed: int, around_straight: bool = False) -
         size = 10.0 ** rng.uniform(-12, -2) * (rng.random() < 0.8)
         low, high = Limits(arm).length.lower_m, Limits(arm).length.upper_m
         mean = rng.uniform(low.max() + 0.011, high.min() - 0.011)
-        return mean + size * rng.uniform(-1.0, 1.0, (arm.n_sections, 3))
+        return np.asarray(mean + size * rng.uniform(-1.0, 1.0, (arm.n_sections, 3)))
 
     for count in range(number):
         place(controller, arm, lengths(), watch)
@@ -253,8 +253,9 @@ def acceptance(arm: Arm, ticks: int, seed: int) -> dict[str, object]:
     """Share of usable results of OSQP along wild motions, with every limit there is touched."""
     reach = arm.total_rest_length_m
     ball = Sphere((0.6 * reach, 0.0, 0.8 * reach), 0.15 * reach)
-    tight = {"pressure_slew_max_pa_s": 1.2e5, "pressure_max_pa": 0.5e5, "bend_max_rad": 1.2}
-    section = replace(arm.sections[0], **tight)
+    section = replace(
+        arm.sections[0], pressure_slew_max_pa_s=1.2e5, pressure_max_pa=0.5e5, bend_max_rad=1.2
+    )
     arm = replace(arm, keep_outs=(ball,), body_radius_m=0.02, sections=(section, *arm.sections[1:]))
     rng, controller, watch = np.random.default_rng(seed), Controller(arm, SETTINGS), Watch(arm)
     place(controller, arm, arm.rest_lengths_m, watch)

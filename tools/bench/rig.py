@@ -23,7 +23,7 @@ _START_NS = 5_000_000_000
 _TIMEOUTS = Timeouts(target_s=0.2, arming_s=30.0, hold_s=60.0, full_disk_vent_s=0.5)
 
 
-class Seen:
+class FilmedArm:
     """A simulated arm, whose newest true tip the camera looks at."""
 
     has_watchdog = True
@@ -50,7 +50,7 @@ class Seen:
         self.device.close()
 
 
-class Rig:
+class CameraRig:
     """Daemon's loop, arm and camera; one tick is one period of the configuration.
 
     The camera takes ``camera_hz`` poses a second, which arrive ``delay_s`` later, with
@@ -69,7 +69,7 @@ class Rig:
         self.arm = configuration.build_arm()
         rate_hz = configuration.control.rate_hz
         self.period_ns = round(1e9 / rate_hz)
-        self.hardware = Seen(backends.build(configuration, self.arm))
+        self.hardware = FilmedArm(backends.build(configuration, self.arm))
         self.events: list[pb.Event] = []
         settings = LoopSettings.of(configuration, _TIMEOUTS, _START_NS, _START_NS)
         self.hardware.connect()
@@ -116,7 +116,7 @@ class Rig:
         self._records.append(bytes(record))
         self._look()
 
-    def activate(self) -> "Rig":
+    def activate(self) -> "CameraRig":
         """Wait for ready, and arm."""
         while self.loop.mode != Mode.READY:
             self.tick()

@@ -123,7 +123,8 @@ class Bench:
     @property
     def newest(self) -> np.void:
         dtype = tick_dtype(self.arm.n_sections)
-        return np.frombuffer(self.records[-1], dtype)[0]
+        tick: np.void = np.frombuffer(self.records[-1], dtype)[0]
+        return tick
 
     def ticks(self) -> np.ndarray:
         return np.frombuffer(b"".join(self.records), tick_dtype(self.arm.n_sections))

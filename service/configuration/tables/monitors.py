@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.configuration.tables.table import BAR, MM, Positive, Table
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 
 MS = 1e-3
 

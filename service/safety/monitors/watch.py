@@ -2,6 +2,7 @@
 
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.hardware.interface import Measurement
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.modes.mode import VENTED_MODES, Mode
 from pneuarm.service.safety.faults import FaultCode
 from pneuarm.service.safety.monitors.age import Age
@@ -17,7 +18,6 @@ from pneuarm.service.safety.monitors.overruns import Overruns
 from pneuarm.service.safety.monitors.pressure_follows import PressureFollows
 from pneuarm.service.safety.monitors.sensor_range import SensorRange
 from pneuarm.service.safety.monitors.setpoint import Setpoint
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 from pneuarm.service.safety.monitors.supply import Supply
 
 

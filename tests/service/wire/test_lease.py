@@ -2,7 +2,7 @@
 
 import pytest
 
-from pneuarm.controllers.arm.errors import LeaseRefused, TargetRejected
+from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected, TargetRejected
 from pneuarm.service.wire.lease import Lease
 
 TIMEOUT_S = 5.0
@@ -172,7 +172,7 @@ def test_a_target_that_is_only_checked_counts_for_nothing() -> None:
      "\u202e", "\u2028", "\u200b", "\ufeff", "\ud800", "a\tb", "\x9b31m"],
 )  # fmt: skip
 def test_a_holder_has_a_name_that_can_be_told(client: str) -> None:
-    with pytest.raises(LeaseRefused) as caught:
+    with pytest.raises(MessageRejected) as caught:
         Lease(TIMEOUT_S).take(client, "", False, 0.0)
     assert "client_id" in str(caught.value)
     assert str(caught.value).isprintable()

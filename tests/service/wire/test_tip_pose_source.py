@@ -7,7 +7,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pneuarm.controllers.arm.errors import ConfigurationError, TargetRejected
+from pneuarm.controllers.arm.errors import ConfigurationError, MessageRejected
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig
 from pneuarm.service.wire.tip_pose_source import (
     SILENT_S,
@@ -47,12 +47,12 @@ def test_without_a_configured_one_the_first_is_believed_until_it_is_silent() -> 
     take(source, "a", 0, 1.0)
     take(source, "a", 5_000, 1.1)
     for other in ("b", ""):
-        with pytest.raises(TargetRejected, match="second publisher"):
+        with pytest.raises(MessageRejected, match="second publisher"):
             take(source, other, 6_000, 1.2)
-    with pytest.raises(TargetRejected, match="not newer"):
+    with pytest.raises(MessageRejected, match="not newer"):
         take(source, "a", 5_000, 1.3)
     take(source, "b", 1_000, 1.2 + 2 * SILENT_S)
-    with pytest.raises(TargetRejected, match="second publisher"):
+    with pytest.raises(MessageRejected, match="second publisher"):
         take(source, "a", 7_000, 1.3 + 2 * SILENT_S)
 
 
@@ -61,7 +61,7 @@ def test_the_configured_one_is_believed_and_nobody_else_however_silent_it_is() -
     assert not source.is_open
     for now_s in (0.0, 1000.0):
         for other in ("", "b", "mocap2", "mocap/x", "Mocap"):
-            with pytest.raises(TargetRejected) as caught:
+            with pytest.raises(MessageRejected) as caught:
                 take(source, other, 0, now_s)
             for fact in ("feedback.tip_pose_source", "'mocap'", "sensor/tip_pose/mocap"):
                 assert fact in str(caught.value)
@@ -77,7 +77,7 @@ def test_a_pose_that_is_refused_later_keeps_no_other_out() -> None:
 @pytest.mark.parametrize("key", [b"", b"another key of the same length", KEY + b"x"])
 def test_a_signed_source_takes_no_pose_without_its_signature(key: bytes) -> None:
     source = TipPoseSource("mocap", KEY)
-    with pytest.raises(TargetRejected, match=r"feedback\.tip_pose_key_file.*HMAC-SHA256"):
+    with pytest.raises(MessageRejected, match=r"feedback\.tip_pose_key_file.*HMAC-SHA256"):
         take(source, "mocap", 1, 0.0, key)
     take(source, "mocap", 1, 0.0, KEY)
 
@@ -86,7 +86,7 @@ def test_a_signed_pose_is_taken_once_whenever_it_is_said_again() -> None:
     source = TipPoseSource("mocap", KEY)
     take(source, "mocap", 1_000, 0.0, KEY)
     for stamp_ns in (1_000, 999, 0):
-        with pytest.raises(TargetRejected, match=r"not newer|timestamp is missing"):
+        with pytest.raises(MessageRejected, match=r"not newer|timestamp is missing"):
             take(source, "mocap", stamp_ns, 3600.0, KEY)
     take(source, "mocap", 1_001, 3600.0, KEY)
 
@@ -94,7 +94,7 @@ def test_a_signed_pose_is_taken_once_whenever_it_is_said_again() -> None:
 def test_a_signature_is_of_its_payload_alone() -> None:
     source = TipPoseSource("", KEY)
     assert not source.is_open
-    with pytest.raises(TargetRejected):
+    with pytest.raises(MessageRejected):
         source.check_publisher("", b"one", signature(KEY, b"other"), 0.0)
     source.check_publisher("", b"one", signature(KEY, b"one"), 0.0)
 
@@ -107,7 +107,7 @@ def test_any_stamp_is_taken_or_refused_in_one_sentence(seconds: int, nanos: int)
     if valid:
         TipPoseSource().take("a", message, 0.0)
         return
-    with pytest.raises(TargetRejected) as caught:
+    with pytest.raises(MessageRejected) as caught:
         TipPoseSource().take("a", message, 0.0)
     assert f"{seconds} s and {nanos} ns" in str(caught.value)
 

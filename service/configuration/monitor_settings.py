@@ -1,4 +1,4 @@
-"""The thresholds of the monitors in SI units; defaults in service/configuration/tables."""
+"""The thresholds of the monitors in SI units; their defaults are in tables/monitors.py."""
 
 from dataclasses import dataclass
 

@@ -1,27 +1,26 @@
-"""Writes docs/validation.md: ``python -m pneuarm.service.validation.report [--out DIR]``.
+"""Writes docs/validation.md: ``python -m tools.validation.report [--out DIR]``, `make validate`.
 
 Every section is a function without arguments that returns its Markdown; the pictures lie beside
-the document in ``images/``. The figures of the kinematics, of the workspace and of the finite
-elements live with the tests, which are no part of an installed package; where one of these
-modules is missing, the document says so in its place.
+the document in ``images/``.
 """
 
 import argparse
 from collections.abc import Callable
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
-from pneuarm.service.validation.models import compare
-from pneuarm.service.validation.models_report import (
+from pneuarm.service.validation.command import parameters_text, table1_report, table_cells
+from pneuarm.service.validation.table1 import read_table
+from tools.validation import figures_kinematics, figures_workspace
+from tools.validation.finite_elements import report as finite_elements
+from tools.validation.markdown import markdown_table
+from tools.validation.models import compare
+from tools.validation.models_picture import draw
+from tools.validation.models_report import (
     errors_table,
     failures_table,
     paper_arm,
     table1_weight_over_bending_per_m3,
 )
-from pneuarm.service.validation.table1 import read_table
-from pneuarm.service.validation.table1_report import parameters_text, table1_report, table_cells
-from pneuarm.service.validation.text import markdown_table
 
 #: A section returns its Markdown, its title first, without an empty line at the end.
 Section = Callable[[], str]
@@ -102,32 +101,13 @@ Where they fail: one chamber longer than the others by the length in the heading
 ![Errors over the bend, and where gravity takes the tip]({_PICTURES}/{_MODELS_PICTURE})"""
 
 
-def from_module(title: str, module: str) -> Section:
-    """Return the section that ``module.section()`` gives, or a note that it is missing."""
-
-    def section() -> str:
-        if not _exists(module):
-            return f"## {title}\n\nNot computed: this checkout has no module `{module}`."
-        text: str = import_module(module).section()
-        return text
-
-    return section
-
-
-def _exists(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except ModuleNotFoundError:
-        return False
-
-
 #: The document, in its order.
 SECTIONS: tuple[Section, ...] = (
-    from_module("Kinematics", "tools.validation.figures_kinematics"),
-    from_module("Workspace", "tools.validation.figures_workspace"),
+    figures_kinematics.section,
+    figures_workspace.section,
     table1,
     gravity,
-    from_module("Finite elements", "tools.validation.finite_elements.report"),
+    finite_elements.section,
     models,
 )
 
@@ -141,10 +121,9 @@ def write_document(directory: Path, sections: tuple[Section, ...] = SECTIONS) ->
 
 
 def draw_pictures(directory: Path) -> None:
-    """Draw the picture of the models into ``directory``."""
-    from pneuarm.service.validation.models_picture import draw
-
+    """Draw the pictures of the workspaces and of the models into ``directory``."""
     directory.mkdir(parents=True, exist_ok=True)
+    figures_workspace.draw(directory)
     draw(paper_arm(), table1_weight_over_bending_per_m3(), directory / _MODELS_PICTURE)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.constant_curvature import lengths_from_shapes
 from pneuarm.controllers.kinematics.models.paper import SingularityFree
-from pneuarm.service.validation.models import (
+from pneuarm.logs.view.pyplot import pyplot
+from tools.validation.models import (
     MOUNTINGS,
     all_models,
     reference_rod,
@@ -32,17 +33,12 @@ def sweep(arm: Arm, low_rad: float, count: int = _BENDS) -> tuple[Array, Array]:
 
 def draw(arm: Arm, weight_over_bending_per_m3: float, path: Path) -> None:
     """Write the picture as PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11.0, 4.6), dpi=130)
+    figure, (left, right) = pyplot().subplots(1, 2, figsize=(11.0, 4.6), dpi=130)
     _draw_errors(left, arm, weight_over_bending_per_m3)
     _draw_tips(right, arm, weight_over_bending_per_m3)
     figure.tight_layout()
     figure.savefig(path)
-    pyplot.close(figure)
+    pyplot().close(figure)
 
 
 def _draw_errors(axes: Any, arm: Arm, weight: float) -> None:

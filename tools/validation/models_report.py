@@ -1,7 +1,6 @@
 """The comparison of the models as JSON, Markdown and a picture.
 
-``python -m pneuarm.service.validation.models_report [--out DIR] [--samples N]``; the picture needs
-matplotlib.
+``python -m tools.validation.models_report [--out DIR] [--samples N]``.
 """
 
 import argparse
@@ -11,9 +10,10 @@ from pathlib import Path
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.service.configuration.configuration import load
 from pneuarm.service.validation.gravity import fit_rows
-from pneuarm.service.validation.models import MOUNTINGS, ModelResult, NearStraight, as_json, compare
 from pneuarm.service.validation.table1 import identify, read_table
-from pneuarm.service.validation.text import markdown_table
+from tools.validation.markdown import markdown_table
+from tools.validation.models import MOUNTINGS, ModelResult, NearStraight, as_json, compare
+from tools.validation.models_picture import draw
 
 
 def paper_arm() -> Arm:
@@ -80,8 +80,6 @@ def _percent(value: float) -> str:
 
 def write(directory: Path, count: int) -> list[ModelResult]:
     """Compare, and write models.json, models.md and models.png into ``directory``."""
-    from pneuarm.service.validation.models_picture import draw
-
     weight, arm = table1_weight_over_bending_per_m3(), paper_arm()
     results = compare(arm, weight, count)
     directory.mkdir(parents=True, exist_ok=True)

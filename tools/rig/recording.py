@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneuarm.controllers.arm.arm import Arm
 from pneuarm.logs.recording.recorder import Recorder, RecorderSettings
 from pneuarm.logs.rings.ring import RingWriter
 from pneuarm.logs.rings.rings import MessageWriter, Rings
@@ -42,14 +43,19 @@ class FakeTime:
 class Session:
     """Rings and everything that writes them, and recorders that follow one another."""
 
-    def __init__(self, directory: Path, clock: FakeTime) -> None:
+    def __init__(self, directory: Path, clock: FakeTime, arm: Arm | None = None) -> None:
         self.clock = clock
-        self.rings = Rings.create(CONTEXT, 1, RATE_HZ)
+        arm = arm or paper_arm()
+        self._info = pb.Info()
+        self._info.CopyFrom(INFO)
+        self._info.bend_max_rad[:] = arm.per_section("bend_max_rad").reshape(-1).tolist()
+        self._n_sections = arm.n_sections
+        self.rings = Rings.create(CONTEXT, arm.n_sections, RATE_HZ)
         self.status = RecorderStatus.create(CONTEXT)
         self.settings = RecorderSettings(
             directory=directory,
             session="20260102T000000Z-paper",
-            arm=paper_arm(),
+            arm=arm,
             roll_bytes=1 << 30,
             roll_s=1e9,
             keep_bytes=0,
@@ -68,15 +74,15 @@ class Session:
         self.settings = replace(self.settings, **changes)  # type: ignore[arg-type]
 
     def recorder(self) -> Recorder:
-        return Recorder(self.settings, INFO, self.rings, self.status)
+        return Recorder(self.settings, self._info, self.rings, self.status)
 
     def write_ticks(self, count: int) -> None:
         """Ticks of numbers that do not compress away."""
         for _ in range(count):
-            tick = new_tick(1)
+            tick = new_tick(self._n_sections)
             tick["sequence"] = self._ticks.last_sequence + 1
             tick["time_unix_ns"] = START_NS + self._ticks.last_sequence * PERIOD_NS
-            tick["pressure_measured_pa"] = self._random.normal(size=(1, 3))
+            tick["pressure_measured_pa"] = self._random.normal(size=(self._n_sections, 3))
             tick["tip_estimated_position_m"] = self._random.normal(size=3)
             tick["tip_estimated_orientation_xyzw"] = (0.0, 0.0, 0.0, 1.0)
             self._ticks.write(tick.tobytes())
@@ -99,10 +105,13 @@ class Session:
 MakeSession = Callable[[], Session]
 
 
-def make_session(directory: Path, monkeypatch: pytest.MonkeyPatch) -> Session:
+def make_session(
+    directory: Path, monkeypatch: pytest.MonkeyPatch, arm: Arm | None = None
+) -> Session:
+    """Make a session whose recorders look at a clock of its own, as long as the patch holds."""
     clock = FakeTime()
     monkeypatch.setattr("pneuarm.logs.recording.recorder.time", clock)
-    return Session(directory, clock)
+    return Session(directory, clock, arm)
 
 
 def recorded(path: Path) -> tuple[list[int], list[str]]:
