@@ -134,7 +134,7 @@ def test_a_flood_of_events_is_no_flood_of_lines(terminal: Terminal) -> None:
     terminal.clock.now_s += 1.0
     terminal.tell("another")
     lines = terminal.step()
-    assert lines[0] == "(491 more events; all of them are in the log)"
+    assert "491 more events" in lines[0]
     assert lines[1].endswith("another")
     terminal.clock.now_s += 1.0
     terminal.tell("later")
