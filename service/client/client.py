@@ -10,13 +10,13 @@ import socket
 import time
 import uuid
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
 from types import TracebackType
 from typing import Any, TypeVar
 
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
+from pneuarm import __version__
 from pneuarm.controllers.arm.errors import (
     DaemonUnreachable,
     LeaseRefused,
@@ -85,13 +85,9 @@ def new_client_id(name: str = "") -> str:
 
 def _versions_apart(daemons: str) -> str:
     """Say so where daemon and client are of different versions."""
-    try:
-        own = version("pneuarm-client")
-    except PackageNotFoundError:
+    if not daemons or daemons == __version__:
         return ""
-    if not daemons or daemons == own:
-        return ""
-    return f" (the daemon is pneuarm {printable(daemons, 32)}, this client {own})"
+    return f" (the daemon is pneuarm {printable(daemons, 32)}, this client {__version__})"
 
 
 class Client:
@@ -230,7 +226,10 @@ class Client:
         payload, encoding = request.SerializeToString(), encoding_of(request)
         for found in self._ask(topic, payload, type(answer), _QUERY_S, encoding=encoding):
             return found
-        raise DaemonUnreachable(f"the daemon of arm {self.arm!r} does not answer")
+        raise DaemonUnreachable(
+            f"the daemon of arm {self.arm!r} does not answer {topic.key}; where its Zenoh file has "
+            "access control, this client's certificate may not be allowed to ask"
+        )
 
     def _ask(
         self, topic: Topic, payload: bytes, answer: type[M], timeout_s: float, **options: Any

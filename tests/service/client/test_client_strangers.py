@@ -156,12 +156,12 @@ def test_a_refusal_says_which_versions_there_are(
 ) -> None:
     with daemon.client() as client:
         own = client.info().versions["pneuarm"]
-        monkeypatch.setattr("pneuarm.service.client.client.version", lambda name: "99.9")
+        monkeypatch.setattr("pneuarm.service.client.client.__version__", "99.9")
         with pytest.raises(ModeRefused) as caught:
             client.release()
         assert own in str(caught.value)
         assert "99.9" in str(caught.value)
-        monkeypatch.setattr("pneuarm.service.client.client.version", lambda name: own)
+        monkeypatch.setattr("pneuarm.service.client.client.__version__", own)
         with pytest.raises(ModeRefused) as caught:
             client.release()
         assert own not in str(caught.value)
