@@ -1,14 +1,17 @@
 """The documents against the project: tables are fresh, what is named exists, commands parse."""
 
+import ast
 import re
 import shlex
 from pathlib import Path
 
 import pytest
 
+from pneuarm.hardware.device import Device, EmulatedDevice
 from pneuarm.logs.schema.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from pneuarm.service.cli.parser import build_parser
 from pneuarm.service.configuration.configuration import load
+from pneuarm.service.configuration.devices import AnyDevice, devices
 from pneuarm.service.safety.faults import FaultCode, Policy
 from tools.docs import configuration, messages
 from tools.docs.pages import PAGES, ROOT, fresh
@@ -33,6 +36,13 @@ def first_cells(text: str) -> set[str]:
     """Everything in backticks in the first column of the tables in a text."""
     lines = (line for line in text.splitlines() if line.startswith("|"))
     return {name for line in lines for name in re.findall(r"`([^`]+)`", line.split("|")[1])}
+
+
+def table_rows(text: str) -> dict[str, list[str]]:
+    """Cells of the rows of the tables in a text, by every name in backticks in their first."""
+    lines = (line[1:-1] for line in text.splitlines() if line.startswith("|"))
+    cells = ([cell.strip() for cell in line.split("|")] for line in lines)
+    return {name: row for row in cells for name in re.findall(r"`([^`]+)`", row[0])}
 
 
 def code_blocks(page: Path, language: str) -> list[str]:
@@ -62,10 +72,7 @@ def test_every_table_of_the_configuration_has_its_place() -> None:
 
 
 #: Tables whose keys are told by the page alone so far; no other may be.
-UNTOLD = {
-    *("hardware", "monitors", "simulator", "replay"),
-    *("festo_cpx", "festo_vtem", "ctrl_p", "esp32"),
-}
+UNTOLD = {"monitors"}
 
 
 @pytest.mark.parametrize("path", sorted(set(configuration.tables()) - UNTOLD))
@@ -124,6 +131,33 @@ def test_there_is_one_place_for_the_campaign() -> None:
     text = (DOCS / "safety.md").read_text()
     assert text.count(BEGIN) == text.count(END) == 1
     assert text.index(BEGIN) < text.index(END)
+
+
+@pytest.mark.parametrize("device", devices().usable.values(), ids=lambda device: device.name)
+def test_what_every_device_leaves_in_the_arm_is_described(device: AnyDevice) -> None:
+    watchdog = table_rows(section("hardware.md", "Which device has a watchdog"))[device.name][1]
+    assert (watchdog == "no") == bool(device.left_behind(device.config()))
+
+
+def test_every_member_of_a_kind_of_device_is_described() -> None:
+    described = " ".join(first_cells(section("hardware.md", "Write your own adapter")))
+    members = [name for name in {**vars(Device), **vars(EmulatedDevice)} if name[0] != "_"]
+    left_alone = {"table", "never_waits"}  # follows from the name; of what is in memory only
+    own = {"name", "summary", "config", *members} - left_alone
+    assert [name for name in sorted(own) if name not in described] == []
+
+
+def test_the_test_of_a_device_of_your_own_is_the_examples() -> None:
+    (block,) = code_blocks(DOCS / "hardware.md", "python")
+    example = ast.parse((ROOT / "examples/device/tests/test_contract.py").read_text())
+    for node in ast.walk(example):
+        if isinstance(node, ast.ClassDef | ast.Module):
+            node.body = [part for part in node.body if not _is_docstring(part)]
+    assert ast.dump(ast.parse(block)) == ast.dump(example)
+
+
+def _is_docstring(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def test_the_worked_example_is_a_good_configuration(tmp_path: Path) -> None:

@@ -22,9 +22,6 @@ class ReplayDevice:
     in the log is skipped: the reading behind it follows the one before.
     """
 
-    #: There is no air behind it.
-    has_watchdog = True
-
     def __init__(self, arm: Arm, path: Path) -> None:
         """Raise ConfigurationError for a log that is none, or of an arm with other sections."""
         self._arm, self._path = arm, path

@@ -58,7 +58,7 @@ class _Run:
         self.ticks += 1
         given: list[Command] = [Heartbeat(operator=True), *commands]
         record, _ = self._loop.tick(self.now_ns, given, Disk.OK, Timing())
-        newest: np.void = np.frombuffer(bytes(record), self._dtype)[0]
+        newest: np.void = np.frombuffer(record, self._dtype)[0]
         return newest
 
     def activate(self) -> None:

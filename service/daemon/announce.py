@@ -25,7 +25,7 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
     arm, zenoh, rerun = configuration.arm, configuration.zenoh, configuration.rerun
     sections = len(arm.sections)
     device = backends.address(configuration)
-    if configuration.hardware.adapter == "simulator":
+    if configuration.is_simulated:
         device += f", seed {configuration.simulator.seed}"
     lines = [
         f"arm        {arm.name}: {sections} section{'s' * (sections > 1)}, {3 * sections} chambers",

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 
@@ -27,7 +28,7 @@ def tables(seed: int) -> dict[str, object]:
     """
     return {
         "control": {"target_timeout_ms": 2000.0},
-        "simulator": {"seed": seed},
+        SIMULATOR.table: {"seed": seed},
         "zenoh": {"listen": [f"tcp/127.0.0.1:{_free_port()}"]},
         "rerun": {"port": _free_port(), "start_server": False, "recording": "pneuarm-demo"},
     }
@@ -42,7 +43,7 @@ def _free_port() -> int:
 
 def parts(configuration: Configuration, seconds: float) -> list[DemoPart]:
     """Return what is shown in about ``seconds`` of drawing."""
-    if configuration.hardware.adapter != "simulator":
+    if not configuration.is_simulated:
         whole = {"circle": 0.45 * seconds, "eight": 0.45 * seconds, "out of reach": 1.0}
         caption = "through the emulated device: its true tip is not known"
         return [DemoPart("device", caption, lambda: configuration, False, whole)]

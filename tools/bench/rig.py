@@ -26,8 +26,6 @@ _TIMEOUTS = Timeouts(target_s=0.2, arming_s=30.0, hold_s=60.0, full_disk_vent_s=
 class FilmedArm:
     """A simulated arm, whose newest true tip the camera looks at."""
 
-    has_watchdog = True
-
     def __init__(self, device: Hardware) -> None:
         self.device = device
         self.tip: tuple[Array, Array] | None = None
@@ -113,7 +111,7 @@ class CameraRig:
             self._sequence += 1
             given.append(SetTarget(self._target, self._sequence, self.now_ns))
         record, _ = self.loop.tick(self.now_ns, given, Disk.OK, Timing())
-        self._records.append(bytes(record))
+        self._records.append(record)
         self._look()
 
     def activate(self) -> "CameraRig":

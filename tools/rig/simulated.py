@@ -42,7 +42,6 @@ class Watched:
     fail_read: Exception | None = None
     fail_write: Exception | None = None
     fail_vent: Exception | None = None
-    has_watchdog: bool = True
 
     def connect(self) -> None:
         self.device.connect()
@@ -138,7 +137,7 @@ class Bench:
         self._overruns += self.overruns_per_tick
         timing = Timing(compute_s=1e-4, overruns=int(self._overruns))
         record, replies = self.loop.tick(self.now_ns, [*given, *commands], self.disk, timing)
-        self.records.append(bytes(record))
+        self.records.append(record)
         self.replies += replies
         return self.newest
 

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.targets.targets import LawName
-from pneuarm.service.configuration.tables.table import MM, Positive, Table
+from pneuarm.hardware.tables.table import MM, Positive, Table
 
 
 class ControlConfig(Table):

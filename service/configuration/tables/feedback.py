@@ -6,7 +6,7 @@ from pydantic import Field
 
 from pneuarm.controllers.feedback.observer import FeedbackSettings
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.service.configuration.tables.table import MM, Positive, Table
+from pneuarm.hardware.tables.table import MM, Positive, Table
 
 _MBAR = 100.0
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from pneuarm.controllers.geometry.frames import Frames, Transform, transform_of
-from pneuarm.service.configuration.tables.table import MM, Finite, Table
+from pneuarm.hardware.tables.table import MM, Finite, Table
 
 Triple = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pneuarm.service.configuration.tables.table import Positive, Table
+from pneuarm.hardware.tables.table import Positive, Table
 
 Endpoint = Annotated[
     str, Field(pattern=r"^(tcp|tls|udp|quic|ws|unixsock-stream|unixpipe|serial|vsock)/[^\s]+$")

@@ -12,7 +12,7 @@ from pneuarm.service.safety.monitors.frozen import Frozen
 from pneuarm.service.safety.monitors.lag import Lag
 from pneuarm.service.safety.monitors.leak import Leak
 from pneuarm.service.safety.monitors.model_holds import ModelHolds
-from pneuarm.service.safety.monitors.monitor import Monitor, Seen
+from pneuarm.service.safety.monitors.monitor import Monitor, Observation
 from pneuarm.service.safety.monitors.overpressure import Overpressure
 from pneuarm.service.safety.monitors.overruns import Overruns
 from pneuarm.service.safety.monitors.pressure_follows import PressureFollows
@@ -83,7 +83,7 @@ class Watch:
         # Before its first acknowledgement a device has not been told anything but zero.
         sent = [value if value == value else 0.0 for value in sent_pa.ravel().tolist()]
         setpoints = measurement.setpoints_pa
-        seen = Seen(
+        seen = Observation(
             now_s=now_s,
             dt_s=dt_s,
             mode=mode,

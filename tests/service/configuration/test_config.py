@@ -26,6 +26,7 @@ from pneuarm.service.configuration.configuration import (
     log_directory,
     rerun_url,
 )
+from pneuarm.service.devices import registry
 
 SECTION = load().model_dump()["arm"]["sections"][0]
 
@@ -232,9 +233,9 @@ def test_a_configuration_is_never_changed() -> None:
 
 def test_addresses(tmp_path: Path) -> None:
     one = load()
-    assert one.device_address == "simulator:paper"
+    assert registry.address(one) == "simulator:paper"
     two = loaded(tmp_path, "[hardware]\ndevice = 'bench'\n[rerun]\nbind = '0.0.0.0'\nport = 99\n")
-    assert two.device_address == "simulator:bench"
+    assert registry.address(two) == "simulator:bench"
     assert rerun_url(one) == "rerun+http://127.0.0.1:9876/proxy"
     assert rerun_url(two) == "rerun+http://127.0.0.1:99/proxy"
     assert log_directory(loaded(tmp_path, "[log]\ndirectory = '~/x'")) == Path.home() / "x"

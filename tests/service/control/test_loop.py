@@ -15,6 +15,7 @@ from pneuarm.controllers.targets.targets import (
 )
 from pneuarm.hardware.guard import Intervention
 from pneuarm.logs.rings.status import Disk
+from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.service.control.loop import Timing
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import Heartbeat, RequestMode, SetTipPose
@@ -134,7 +135,9 @@ def test_one_tick_of_rubbish_leaves_nothing_behind(
     bench.run(1.5, NEAR)
     before = bench.newest["pressure_sent_pa"].copy()
     with monkeypatch.context() as patch:
-        patch.setattr(bench.loop._controller, "pressures_pa", lambda: np.full((1, 3), rubbish))
+        patch.setattr(
+            bench.loop._steering._controller, "pressures_pa", lambda: np.full((1, 3), rubbish)
+        )
         bench.tick()
     assert bench.newest["guard_intervention"]
     bench.ask(ModeEvent.HOLD)
@@ -253,8 +256,9 @@ def test_events_and_ticks_have_the_time_of_the_session() -> None:
 def test_the_clocks_figures_are_written_down() -> None:
     bench = Bench()
     bench.now_ns += bench.period_ns
-    bench.loop.tick(bench.now_ns, [Heartbeat(False)], Disk.OK, Timing(1e-5, 2e-4, 7))
-    tick = bench.loop._tick
+    timing = Timing(1e-5, 2e-4, 7)
+    record, _ = bench.loop.tick(bench.now_ns, [Heartbeat(False)], Disk.OK, timing)
+    tick = np.frombuffer(record, tick_dtype(1))[0]
     assert (tick["wake_latency_s"], tick["compute_s"], tick["overruns"]) == (1e-5, 2e-4, 7)
 
 
@@ -268,7 +272,9 @@ def test_a_measured_tip_is_written_down_with_its_age() -> None:
 
 def test_the_guards_work_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench().activate()
-    monkeypatch.setattr(bench.loop._controller, "pressures_pa", lambda: np.full((1, 3), 1e6))
+    monkeypatch.setattr(
+        bench.loop._steering._controller, "pressures_pa", lambda: np.full((1, 3), 1e6)
+    )
     bench.run(0.01)
     assert Intervention(int(bench.newest["guard_intervention"])) & Intervention.RANGE
     assert bench.newest["guard_interventions"] == 5

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, create_model
 
-from pneuarm.service.configuration.tables.table import Finite, Positive, Table
+from pneuarm.hardware.tables.table import Finite, Positive, Table
 from tools.docs import configuration, messages
 from tools.docs.pages import make
 from tools.docs.regions import NoSuchTable, filled, linked, names, table

@@ -14,7 +14,7 @@ from pneuarm.controllers.arm.arm import (
     Section,
     Sphere,
 )
-from pneuarm.service.configuration.tables.table import (
+from pneuarm.hardware.tables.table import (
     BAR,
     DEG,
     MM,

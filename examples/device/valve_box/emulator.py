@@ -1,30 +1,33 @@
-"""The device of the example adapter: valves on a thread, with an emulated arm behind them."""
+"""A box without the box: its lines on a port of loopback, with an emulated arm behind them."""
 
 import socket
 import threading
 import time
 
-import numpy as np
-
-from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.hardware.emulation.emulation import EmulatedArm
+from valve_box.protocol import WATCHDOG_S, answer_line, values_pa
 
-MBAR = 100.0
-WATCHDOG_S = 0.2
+#: Faults of its transport; those of the air are the emulated arm's.
+WORDS = ("unplug S",)
+
+#: How long one look for a line lasts at most (s).
+_LOOK_S = 0.01
 
 
-class ValveBoxDevice:
+class EmulatedValveBox:
     """Serves one host at a time on a port of loopback that stays the same."""
 
     def __init__(self, arm: EmulatedArm) -> None:
         self._arm = arm
         self._lock = threading.Lock()
-        self._plugged, self._ended = True, False
+        self._n_sections = arm.n_chambers // 3
+        self._unplugged_until_s, self._ended = 0.0, False
         self._listening = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._listening.getsockname()[1])
         self._thread = threading.Thread(target=self._run, daemon=True)
 
-    def __enter__(self) -> "ValveBoxDevice":
+    def __enter__(self) -> "EmulatedValveBox":
         self._thread.start()
         return self
 
@@ -33,20 +36,25 @@ class ValveBoxDevice:
         self._thread.join(5.0)
         self._listening.close()
 
-    def told_pa(self) -> Array:
-        """Return what the valves are told now."""
-        with self._lock:
-            return self._arm.setpoints_pa.copy()
+    def inject(self, words: str) -> None:
+        """Break something, or ``clear`` it; raises InvalidInput for what is no fault."""
+        name, *values = words.split()
+        if name == "clear":
+            self._unplugged_until_s = 0.0
+        if name != "unplug":
+            with self._lock:
+                self._arm.inject(words)
+            return
+        try:
+            self._unplugged_until_s = time.monotonic() + float(*values)
+        except (TypeError, ValueError) as error:
+            raise InvalidInput(f"fault {words!r}: unplug S, for S seconds") from error
 
-    def unplug(self) -> None:
-        self._plugged = False
-        time.sleep(0.05)
-
-    def plug(self) -> None:
-        self._plugged = True
+    def _plugged(self) -> bool:
+        return time.monotonic() >= self._unplugged_until_s
 
     def _run(self) -> None:
-        self._listening.settimeout(0.01)
+        self._listening.settimeout(_LOOK_S)
         while not self._ended:
             try:
                 host = self._listening.accept()[0]
@@ -57,9 +65,9 @@ class ValveBoxDevice:
                 self._serve(host)
 
     def _serve(self, host: socket.socket) -> None:
-        host.settimeout(0.01)
+        host.settimeout(_LOOK_S)
         rest, heard_s = b"", time.monotonic()
-        while self._plugged and not self._ended:
+        while self._plugged() and not self._ended:
             try:
                 received = host.recv(4096)
             except TimeoutError:
@@ -80,8 +88,7 @@ class ValveBoxDevice:
             now_s = time.monotonic()
             self._arm.advance(now_s)
             if line.startswith(b"P"):
-                self._arm.set_pressures_pa(MBAR * np.array(line.split()[1:], dtype=float), now_s)
+                self._arm.set_pressures_pa(values_pa(line[1:], self._n_sections), now_s)
             elif silent_s >= WATCHDOG_S and self._arm.setpoints_pa.any():
                 self._arm.zero_all(now_s, "watchdog")
-            measured = self._arm.pressures_pa.reshape(-1) / MBAR
-        return " ".join(f"{value:.0f}" for value in measured).encode() + b"\n"
+            return answer_line(self._arm.pressures_pa)

@@ -1,8 +1,4 @@
-"""An adapter to copy from: a box of valves on the network, a line of text for a line of text.
-
-``P 1200 0 -300`` sets the valves (mbar gauge, one value a chamber), ``M`` asks; the box answers
-both with what it measures, ``1198 2 -305``. Without a line for 200 ms it empties itself.
-"""
+"""The valve box behind the interface of every device: one line there, one line back."""
 
 import socket
 from contextlib import suppress
@@ -13,21 +9,18 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.channels import CallOrder, StepCommand
 from pneuarm.hardware.interface import Measurement
+from valve_box.protocol import MEASURE, STEP_PA, set_line, values_pa
 
-MBAR = 100.0
 WHAT = "the valve box"
 
 
 class ValveBox:
     """One box; it satisfies :class:`pneuarm.hardware.interface.Hardware`."""
 
-    #: True only because the box itself does it. Nothing in this process can do it for the box.
-    has_watchdog = True
-
-    def __init__(self, arm: Arm, host: str, port: int, timeout_s: float = 0.2) -> None:
+    def __init__(self, arm: Arm, host: str, port: int, timeout_s: float) -> None:
         """Check the configuration here, and touch no device."""
         self._arm, self._address, self._timeout_s = arm, (host, port), timeout_s
-        self._command = StepCommand(arm, MBAR, WHAT)
+        self._command = StepCommand(arm, STEP_PA, WHAT)
         self._order = CallOrder(WHAT)
         self._socket: socket.socket | None = None
 
@@ -44,7 +37,7 @@ class ValveBox:
     def read(self, time_s: float) -> Measurement:
         """Return what is measured now; a box without length sensors leaves them NaN."""
         self._order.check(time_s)
-        pressures_pa = self._ask("M")
+        pressures_pa = self._ask(MEASURE)
         return Measurement(pressures_pa, np.full_like(pressures_pa, np.nan))
 
     def write(self, pressures_pa: Array, time_s: float) -> Array:
@@ -69,23 +62,21 @@ class ValveBox:
         self._order.end()
 
     def _set(self, pressures_pa: Array) -> None:
-        values = np.rint(pressures_pa.reshape(-1) / MBAR).astype(int).tolist()
-        self._ask("P " + " ".join(map(str, values)))
+        self._ask(set_line(pressures_pa))
 
-    def _ask(self, line: str) -> Array:
+    def _ask(self, line: bytes) -> Array:
         """Send a line and return the answer, (n_sections, 3) in Pa; anything else is an error."""
         if self._socket is None:
             raise HardwareError(f"{WHAT} is not connected: call connect() first")
         try:
-            self._socket.sendall(line.encode() + b"\n")
+            self._socket.sendall(line)
             answer = b""
             while not answer.endswith(b"\n"):
                 received = self._socket.recv(1024)
                 if not received or len(answer) > 1024:
                     raise OSError("the connection was closed" if not received else "no line")
                 answer += received
-            values = [MBAR * float(value) for value in answer.split()]
-            return np.array(values).reshape(self._arm.n_sections, 3)
+            return values_pa(answer, self._arm.n_sections)
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
 
