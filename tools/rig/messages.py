@@ -18,7 +18,7 @@ _INTEGERS = {
 _EDGES = (0.0, -0.0, 5e-324, 1e-308, 1e-9, 1.0, 1e9, 1e308, -1e308, float("inf"), float("nan"))
 
 
-def _values(field: FieldDescriptor, depth: int) -> st.SearchStrategy[Any]:
+def _values(field: Any, depth: int) -> st.SearchStrategy[Any]:
     if field.message_type is not None:
         return messages(field.message_type._concrete_class, depth - 1)
     if field.cpp_type in _INTEGERS:
