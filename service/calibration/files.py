@@ -11,7 +11,8 @@ from pneuarm.controllers.arm.arm import Array, Response, Section
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.frames import Frames
-from pneuarm.controllers.geometry.frames import Transform, rotation_vector
+from pneuarm.controllers.geometry.mountings import Transform
+from pneuarm.controllers.geometry.rotations import rotation_vector
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.tables.table import BAR, DEG, MM
 from pneuarm.service.calibration.values import residuals_text, value_text, values

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.printable import name_of
 
-_LIMITS = ((1, "length, Eq. (4)"), (2, "bend"), (4, "pressure"), (8, "keep-out"))
-
 
 def millimetres(values_m: Iterable[float]) -> str:
     """Format metres as millimetres."""
@@ -21,7 +19,9 @@ def bars(values_pa: Iterable[float]) -> str:
 
 def binding(flags: int) -> str:
     """Names of the limits that bind."""
-    return " and ".join(name for bit, name in _LIMITS if flags & bit) or "no limit"
+    from pneuarm.controllers.limits.limits import names  # CasADi with it: only where it is needed
+
+    return " and ".join(names(flags)) or "no limit"
 
 
 def state_line(state: pb.ArmState) -> str:

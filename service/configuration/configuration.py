@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model, model_vali
 
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
-from pneuarm.controllers.limits.consistency import refuse_contradictions
+from pneuarm.controllers.limits.limits import refuse_contradictions
 from pneuarm.hardware.device import Device
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.simulator.device import SimulatorConfig, simulated_arm

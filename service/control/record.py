@@ -9,13 +9,14 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.feedback.estimator import EstimateSource, TipEstimate
-from pneuarm.controllers.reach.reach import Binding, Reach
-from pneuarm.controllers.reference.trajectory import Motion
-from pneuarm.controllers.targets.targets import KIND_OF, LawName, TargetKind
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
+from pneuarm.controllers.geometry.moving_point import MovingPoint
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
+from pneuarm.controllers.reach.reach import Reach
+from pneuarm.controllers.targets.targets import LawName
 from pneuarm.hardware.guard import Intervention
 from pneuarm.hardware.interface import Measurement
 from pneuarm.logs.rings.tick import pack_tick
+from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.modes.mode import Mode
 from pneuarm.service.processes.pipe import SetTarget, SetTipPose
 
@@ -79,11 +80,11 @@ class Steered(NamedTuple):
     law: LawName
     reach: Reach
     error_m: float
-    binding: Binding
+    binding: int
     qp_fallbacks: int
     goal_m: Array | list[float] | None
     goal_quaternion_xyzw: Array | None
-    reference: Motion | None
+    reference: MovingPoint | None
     tip_model_m: Array
     tip_offset_m: Array
     tip_offset_quaternion_xyzw: Array
@@ -135,7 +136,7 @@ def values_of(tick: Tick, tool_m: Array) -> dict[str, Any]:
         "mode": tick.mode,
         "n_sections": len(tick.commanded_pa),
         "law": steered.law,
-        "target_kind": TargetKind.NONE if target is None else KIND_OF[type(target.target)],
+        "target_kind": pb.NO_TARGET if target is None else target.target.kind,
         "target_sequence": tick.last_target_sequence,
         "target_age_s": tick.target_age_s,
         "reach": steered.reach,

@@ -11,7 +11,7 @@ from pneuarm.controllers.actuation.dither import Dither
 from pneuarm.controllers.actuation.valve_lead import ValveLead
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.feedback.observer import FeedbackSettings
-from pneuarm.controllers.reference.trajectory import Motion
+from pneuarm.controllers.geometry.moving_point import MovingPoint
 
 #: The dither grows from nothing, and a share of the hysteresis or the lead from 0 to 1, in this
 #: time (s).
@@ -54,7 +54,7 @@ class Setpoints:
         dt_s: float,
         now_s: float,
         asked_for: bool,
-        reference: Motion | None,
+        reference: MovingPoint | None,
         corrected: bool,
     ) -> Array:
         """Return the setpoints for wanted pressures, inside the limits, and keep those for a hold.
@@ -74,7 +74,7 @@ class Setpoints:
         return np.minimum(np.maximum(setpoints_pa, self._low_pa), self._high_pa)
 
     def _dither_pa(
-        self, now_s: float, dt_s: float, reference: Motion | None, corrected: bool
+        self, now_s: float, dt_s: float, reference: MovingPoint | None, corrected: bool
     ) -> float:
         """What is added to every setpoint.
 
@@ -92,7 +92,7 @@ class Setpoints:
         self.hysteresis_share = _toward(self._share_at(reference), self.hysteresis_share, dt_s)
         return min(1.0, (now_s - self._dither_since_s) / _RAMP_S) * self._dither.at_pa(now_s)
 
-    def _share_at(self, reference: Motion) -> float:
+    def _share_at(self, reference: MovingPoint) -> float:
         """How much of the hysteresis to invert at the speed of the reference."""
         speed_m_s = math.hypot(*reference.velocity[:3])
         at_rest = self._feedback.hysteresis_share

@@ -11,22 +11,16 @@ import numpy as np
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.actuation.valve_lead import ValveLead
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.feedback.estimator import Estimator
 from pneuarm.controllers.feedback.notch import Notch
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
-from pneuarm.controllers.laws.controller import Controller
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.controllers.laws.settings import ControlSettings
-from pneuarm.controllers.reach.reach import Binding, Reach
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.reference.follower import Follower, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.controllers.targets.targets import (
-    PoseTarget,
-    PositionTarget,
-    PressuresTarget,
-    ShapeTarget,
-    Target,
-)
-from pneuarm.controllers.tasks.tip_pose import rotation_from_quaternion
+from pneuarm.controllers.targets.targets import ShapeTarget, Target
 from pneuarm.hardware.interface import Measurement
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.control.record import Estimate, Steered
@@ -149,7 +143,7 @@ class Steering:
             self._controller.pressures_pa(),
             dt_s,
             now_s,
-            isinstance(self._target, PressuresTarget),
+            self._target is not None and self._target.sends_pressures,
             self._follower.motion,
             self._corrected,
         )
@@ -209,7 +203,7 @@ class Steering:
             law=controller.law_name,
             reach=controller.reach,
             error_m=controller.error_m,
-            binding=controller.binding() if stuck else Binding.NOTHING,
+            binding=controller.binding() if stuck else 0,
             qp_fallbacks=controller.fallbacks,
             goal_m=goal_m,
             goal_quaternion_xyzw=goal_quaternion_xyzw,
@@ -223,10 +217,6 @@ class Steering:
     def _goal(self) -> tuple[Array | list[float] | None, Array | None]:
         """Position (3,) that is wanted now, a shape's on the shape, and quaternion; or None."""
         target = self._target
-        if isinstance(target, PoseTarget):
-            return target.position_m, target.quaternion_xyzw
-        if isinstance(target, PositionTarget):
-            return target.position_m, None
         if isinstance(target, ShapeTarget):
             return self._follower.goal_position, None
-        return None, None
+        return (None, None) if target is None else target.goal()

@@ -15,6 +15,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
+from pneuarm.controllers.limits.limits import names, workspace_is_exact
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 from pneuarm.controllers.workspace.reachability import Reachability
 from pneuarm.controllers.workspace.workspace import Workspace
@@ -63,7 +64,7 @@ class Inbox:
         self._poses = Allowance(_POSES_SHARE)
         self._strangers = Allowance(_STRANGERS_SHARE)
         # With keep-outs the workspace has holes that it does not know; of a tool it knows nothing.
-        known = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
+        known = workspace_is_exact(arm)
         self._workspace = Workspace(arm) if known else None
         self._out_of_reach = False
         self._nearest: tuple[Array, Reachability] | None = None
@@ -150,11 +151,11 @@ class Inbox:
         return replace(target, nearest_lengths_m=lengths)
 
     def _tell_out_of_reach(self, answer: Reachability, client: str) -> None:
-        names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
+        binding = " and ".join(names(answer.limits))
         nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
         self._notes.tell(
             "out_of_reach",
-            f"the target is out of reach: {names} binds; the nearest reachable point is "
+            f"the target is out of reach: {binding} binds; the nearest reachable point is "
             f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
             client,
         )

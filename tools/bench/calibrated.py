@@ -17,7 +17,7 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Reach
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import PositionTarget
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration

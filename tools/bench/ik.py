@@ -21,8 +21,8 @@ import time
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.targets.targets import PositionTarget
 from tools.bench.ik_peers import peers_us
@@ -60,7 +60,7 @@ class Candidate:
     def run(self, targets: int) -> None:
         """Time every step of some motions."""
         step, clock = self._controller.step, time.perf_counter
-        solver = self._controller._motion.qp_ik._solver
+        solver = self._controller._chambers.qp_ik._solver
         for _ in range(targets):
             self._controller.set_target(self._target())
             if self._far:  # on the way there, untimed

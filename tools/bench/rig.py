@@ -5,9 +5,8 @@ from collections import deque
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.targets.shapes import Shape
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.targets.targets import CircleTarget, PositionTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype
@@ -150,6 +149,6 @@ class CameraRig:
         """Go to a position."""
         return self.run(seconds, PositionTarget(np.asarray(position_m, dtype=np.float64)))
 
-    def circle(self, shape: Shape, seconds: float) -> np.ndarray:
+    def circle(self, shape: CircleTarget, seconds: float) -> np.ndarray:
         """Go round."""
-        return self.run(seconds, CircleTarget(shape, 1))
+        return self.run(seconds, shape)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.targets.shapes import Circle
+from pneuarm.controllers.targets.targets import CircleTarget
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 from tools.bench.calibrated import targets_of
@@ -28,7 +28,7 @@ Row = dict[str, Any]
 RATE_HZ = 1000.0
 
 HOME = np.array([0.0, 0.0, 0.2])
-CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25)
+CIRCLE = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25)
 
 #: A target is given this time (s), and its error is that of the last part of it.
 TARGET_S, STEADY_S = 4.0, 0.5

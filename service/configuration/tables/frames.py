@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, field_validator
 
-from pneuarm.controllers.geometry.frames import Frames, Transform, transform_of
+from pneuarm.controllers.geometry.mountings import Mountings, Transform, transform_of
 from pneuarm.hardware.tables.table import MM, Finite, Table
 
 Triple = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
@@ -63,9 +63,9 @@ class FramesConfig(Table):
             )
         return value
 
-    def frames(self) -> Frames:
+    def frames(self) -> Mountings:
         """Return the frames in SI units."""
-        return Frames(
+        return Mountings(
             mocap_frame=self.mocap_frame,
             mocap_to_base=_transform(self.mocap_position_mm, self.mocap_rotation_deg),
             tip_to_marker=_transform(

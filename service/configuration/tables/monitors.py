@@ -20,7 +20,7 @@ class MonitorsConfig(Table):
             allow_inf_nan=False,
             description=(
                 "how far a pressure may be from the one expected: the pressure sent, through "
-                "`delay_ms` and `lag_ms` of [`[arm.response]`](#armresponse); in a move half of "
+                "`delay_ms` and `lag_ms` of `[arm.response]`; in a move half of "
                 "what the valve has still to go is allowed besides"
             ),
         ),

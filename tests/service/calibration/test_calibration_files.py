@@ -5,7 +5,7 @@ import pytest
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.calibration.frames import Frames, rotation_of
-from pneuarm.controllers.geometry.frames import Transform
+from pneuarm.controllers.geometry.mountings import Transform
 from pneuarm.service.calibration.files import MOCAP_FRAME, frames_table
 from pneuarm.service.configuration.tables.frames import FramesConfig
 

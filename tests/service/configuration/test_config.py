@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import HalfSpace, Sphere
 from pneuarm.controllers.arm.errors import ConfigurationError
-from pneuarm.controllers.laws.controller import Controller
+from pneuarm.controllers.controller import Controller
 from pneuarm.service.cli.parser import PRESETS as CLI_PRESETS
 from pneuarm.service.configuration.configuration import (
     PRESETS,

@@ -5,8 +5,7 @@ import pytest
 
 from pneuarm.controllers.feedback.estimator import EstimateSource
 from pneuarm.controllers.reach.reach import Reach
-from pneuarm.controllers.targets.shapes import Circle
-from pneuarm.controllers.targets.targets import LengthsTarget, PressuresTarget
+from pneuarm.controllers.targets.targets import CircleTarget, LengthsTarget, PressuresTarget
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import RequestMode
 from tests.service.control.test_loop_calibrated import calibrated_configuration
@@ -14,7 +13,7 @@ from tools.bench.rig import CameraRig
 from tools.rig.simulated import configuration_of
 
 HOME = np.array([0.0, 0.0, 0.2])
-CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
+CIRCLE = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
 
 
 @pytest.fixture(scope="module")

@@ -9,21 +9,20 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.controller import Controller
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller, Reach
 from pneuarm.controllers.laws.settings import ControlSettings
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import (
-    KIND_OF,
     LawName,
     LengthsTarget,
     PoseTarget,
     PositionTarget,
     PressuresTarget,
     Target,
-    TargetKind,
     TwistTarget,
 )
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 from tests.controllers.laws.driving import DT_S, SETTINGS, every_arm, run
 from tools.rig.arms import paper_arm, random_lengths, table1_arm, trunk_arm
 
@@ -54,11 +53,6 @@ def test_the_default_law_is_a_setting() -> None:
     controller = Controller(paper_arm(), ControlSettings(default_law=LawName.RESOLVED_RATE))
     controller.set_target(POSITION)
     assert controller.law_name == LawName.RESOLVED_RATE
-
-
-def test_every_target_has_its_kind_on_the_wire() -> None:
-    assert set(KIND_OF) == set(Target.__args__)  # type: ignore[attr-defined]
-    assert sorted(KIND_OF.values()) == [kind for kind in TargetKind if kind != TargetKind.NONE]
 
 
 @every_arm

@@ -14,7 +14,8 @@ from pneuarm.controllers.laws.resolved_rate import ResolvedRate
 from pneuarm.controllers.laws.safe_step import SafeStep
 from pneuarm.controllers.laws.solve_ik import IkBuilder, IkProblem, IkSolver
 from pneuarm.controllers.limits.limits import Limits
-from pneuarm.controllers.tasks.task import Task, fill
+from pneuarm.controllers.targets.target import Target
+from pneuarm.controllers.targets.targets import PARTS
 from pneuarm.controllers.tasks.wanted import Wanted
 
 
@@ -30,10 +31,11 @@ class _Compiled:
     """What one set of tasks needs: the problem and the step."""
 
     def __init__(self, arm: Arm, limits: Limits, whole: bool) -> None:
-        self.builder, self.safe = IkBuilder(arm, limits, whole), SafeStep(arm, limits, whole)
+        self.builder = IkBuilder(arm, limits, whole)
+        self.safe = SafeStep(arm, limits, whole, self.builder.problem.rate.size)
 
 
-class Motion:
+class CommandedChambers:
     """The commanded lengths and rates of an arm, and how they follow what is wanted.
 
     ``wanted`` is what the error is measured by; ``pursued`` is what the step follows: the same,
@@ -46,7 +48,7 @@ class Motion:
         self._dt = np.full(1, 1e-3)
         self.limits = Limits(arm)
         self._correction: tuple[Array | None, Array | None] = None, None
-        self.wanted, self.pursued = Wanted(arm.n_chambers), Wanted(arm.n_chambers)
+        self.wanted, self.pursued = (Wanted(arm.n_chambers, PARTS) for _ in range(2))
         self._position_only, self._whole = (
             _Compiled(arm, self.limits, whole) for whole in (False, True)
         )
@@ -85,11 +87,10 @@ class Motion:
         self._rates[:] = 0.0
         self._compiled.safe.take(None)
 
-    def ask(self, task: Task, gain_per_s: float, speed_max_m_s: float) -> None:
-        """Follow one task, or a combination, from now on."""
-        fill(self.wanted, task, gain_per_s, speed_max_m_s)
-        needs_all = self.wanted["orientation_weight"][0] or self.wanted["point_weight"][0]
-        compiled = self._whole if needs_all else self._position_only
+    def ask(self, target: Target, gain_per_s: float, speed_max_m_s: float) -> None:
+        """Follow a target from now on."""
+        target.ask(self.wanted, gain_per_s, speed_max_m_s)
+        compiled = self._whole if self.wanted.beyond_position else self._position_only
         if compiled is not self._compiled:
             self._compiled = compiled
             self.place_tip()
@@ -110,13 +111,13 @@ class Motion:
         self.wanted.correct(offset_m, rotation)
         self.pursued.correct(offset_m, rotation)
 
-    def pursue(self, task: Task | None) -> None:
-        """Follow another task than the one that is asked for; None follows what is asked for."""
-        if task is None:
+    def pursue(self, target: Target | None) -> None:
+        """Follow another target than the one that is asked for; None follows what is asked for."""
+        if target is None:
             self.pursued.values[:] = self.wanted.values
         else:
             gain, speed = self.wanted["gain_per_s"][0], self.wanted["speed_max_m_s"][0]
-            fill(self.pursued, task, float(gain), float(speed))
+            target.ask(self.pursued, float(gain), float(speed))
 
     def step(self, law: Law | None, dt_s: float) -> None:
         """Go on by one tick; without a law, brake."""
@@ -126,7 +127,7 @@ class Motion:
         if law is None:
             safe.take(None)
         else:
-            compiled.builder.function.call()
+            compiled.builder.function.evaluate()
             safe.take(law.wish(compiled.builder.problem))
         self._lengths[:] = safe.moved_m
         self._rates[:] = safe.rates_m_s
@@ -134,5 +135,5 @@ class Motion:
     def problem(self, dt_s: float) -> IkProblem:
         """Build the QP of the next step, without making it."""
         self._dt[0] = dt_s
-        self._compiled.builder.function.call()
+        self._compiled.builder.function.evaluate()
         return self._compiled.builder.problem

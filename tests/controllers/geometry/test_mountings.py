@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from pneuarm.controllers.arm.errors import InvalidInput
-from pneuarm.controllers.geometry.frames import (
-    Frames,
-    Transform,
-    rotation_from_vector,
-    rotation_vector,
-    spin_of,
-    transform_of,
-)
+from pneuarm.controllers.geometry.mountings import Mountings, Transform, transform_of
+from pneuarm.controllers.geometry.rotations import rotation_from_vector, rotation_vector, spin_of
 from pneuarm.controllers.kinematics.compiled import CompiledKinematics
 from tools.rig.arms import paper_arm
 
@@ -36,7 +30,7 @@ def test_more_than_half_a_turn_is_refused() -> None:
 
 
 def test_what_capture_sees_of_a_tip_comes_back_as_that_tip() -> None:
-    frames = Frames("hall", _random(), _random())
+    frames = Mountings("hall", _random(), _random())
     tip = _random()
     back = frames.tool_pose(frames.marker_pose(tip), "hall")
     assert back.position_m == pytest.approx(tip.position_m)
@@ -45,7 +39,7 @@ def test_what_capture_sees_of_a_tip_comes_back_as_that_tip() -> None:
 
 def test_the_tool_point_lies_ahead_of_the_tip_and_other_frames_are_refused() -> None:
     tip = _random()
-    frames = Frames(tool_m=(0.0, 0.0, 0.1))
+    frames = Mountings(tool_m=(0.0, 0.0, 0.1))
     tool = frames.tool_pose(tip, "base")
     assert tool.position_m == pytest.approx(tip.position_m + 0.1 * tip.rotation[:, 2])
     with pytest.raises(InvalidInput, match="'hall': unknown frame; allowed: 'base'"):

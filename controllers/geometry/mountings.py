@@ -1,16 +1,15 @@
-"""Where things are: motion capture, base, marker, tip and tool, as rigid transforms.
+"""How motion capture, base, marker, tip and tool stand to each other, as rigid transforms.
 
-A transform is ``(rotation (3, 3), position (3,))``: it takes coordinates of the second frame of its
-name to the first.
+A transform ``a_to_b`` takes coordinates in a to coordinates in b.
 """
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 
 
 @dataclass(frozen=True)
@@ -32,38 +31,6 @@ class Transform:
         return Transform(back, -(back @ self.position_m))
 
 
-def rotation_vector(rotation: Array) -> Array:
-    """Axis times angle (3,), rad, of a rotation matrix (3, 3); angles up to pi."""
-    axial = 0.5 * np.array(
-        [
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        ]
-    )
-    sine = float(np.sqrt(axial @ axial))
-    cosine = 0.5 * (float(np.trace(rotation)) - 1.0)
-    if sine > 1e-9:
-        return axial * (math.atan2(sine, cosine) / sine)
-    if cosine > 0.0:
-        return axial
-    # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
-    column = np.argmax(np.diag(rotation))
-    axis: Array = rotation[:, column] + np.eye(3)[column]
-    return axis * (math.pi / float(np.linalg.norm(axis)))
-
-
-def rotation_from_vector(vector_rad: Array) -> Array:
-    """Rotation (3, 3) about a vector (3,) by its length in rad (Rodrigues)."""
-    angle = float(np.sqrt(vector_rad @ vector_rad))
-    x, y, z = vector_rad.tolist()
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine = float(np.sinc(angle / np.pi))
-    half = float(np.sinc(0.5 * angle / np.pi))
-    rotation: Array = np.eye(3) + sine * cross + 0.5 * half * half * (cross @ cross)
-    return rotation
-
-
 def transform_of(position_m: Array, rotation_vector_rad: Array) -> Transform:
     """Transform from a position and a rotation vector; raises InvalidInput beyond half a turn."""
     angle = float(np.linalg.norm(rotation_vector_rad))
@@ -75,7 +42,7 @@ def transform_of(position_m: Array, rotation_vector_rad: Array) -> Transform:
 
 
 @dataclass(frozen=True)
-class Frames:
+class Mountings:
     """Mountings of one arm: what a motion-capture system measures, and what targets name.
 
     ``mocap_to_base`` takes coordinates of the capture system to the base, ``tip_to_marker`` those
@@ -105,15 +72,3 @@ class Frames:
     def marker_pose(self, tip: Transform) -> Transform:
         """Pose of the marker in the capture system, from the tip's (not the tool's) in the base."""
         return self.mocap_to_base.inverse() @ tip @ self.tip_to_marker.inverse()
-
-
-def spin_of(turn: Array, rate: Array) -> Array:
-    """Angular velocity (3,) of exp(turn) whose rotation vector changes at a rate (3,)."""
-    angle = float(np.sqrt(turn @ turn))
-    if angle < 1e-9:
-        return rate
-    axis = turn / angle
-    sine = math.sin(angle) / angle
-    along: Array = axis * (axis @ rate)
-    across = (1.0 - math.cos(angle)) / angle * np.cross(axis, rate)
-    return sine * rate + (1.0 - sine) * along + across
