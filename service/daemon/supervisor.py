@@ -22,7 +22,7 @@ from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import Configuration, log_directory
 from pneuarm.service.daemon.announce import Announcer, start_facts
 from pneuarm.service.daemon.info import info_of
-from pneuarm.service.daemon.local_stop import lock
+from pneuarm.service.daemon.local_stop import Callers, lock
 from pneuarm.service.daemon.log_watch import LogWatch
 from pneuarm.service.daemon.repair import start_mending
 from pneuarm.service.daemon.sd_notify import ServiceManager
@@ -35,6 +35,7 @@ from pneuarm.service.processes.device_slots import DeviceLink
 from pneuarm.service.processes.pipe import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from pneuarm.service.processes.shared import ENDING_SIGNALS, REALTIME, START_FAILED, Shared
 from pneuarm.service.processes.usage import ProcessTable
+from pneuarm.service.wire.tip_pose_source import read_key
 
 _PERIOD_S = 0.02
 
@@ -70,6 +71,7 @@ class Supervisor:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
         self._say = say
         self._arm_lock = lock("arm", configuration.arm.name)
+        self._callers = Callers(self._arm_lock)
         backends.check(configuration)
         self._device_lock = lock("device", backends.address(configuration))
         self._check_ports(configuration)
@@ -95,6 +97,7 @@ class Supervisor:
     @staticmethod
     def _check_ports(configuration: Configuration) -> None:
         read_config(configuration.zenoh.config_file)
+        read_key(configuration.feedback)
         for endpoint in configuration.zenoh.listen:
             check_free("zenoh.listen", endpoint)
         if configuration.rerun.enabled and configuration.rerun.start_server:
@@ -290,28 +293,16 @@ class Supervisor:
     # --- the stop from this machine --------------------------------------------------------
 
     def _serve_local_stop(self, timeout_s: float) -> None:
-        watched: list[socket.socket | Pipe] = [self._arm_lock, self._control_pipe]
+        watched: list[socket.socket | Pipe] = [*self._callers.sockets(), self._control_pipe]
         readable, _, _ = select.select(watched, [], [], timeout_s)
-        if self._arm_lock in readable:
-            self._accept_stop()
+        for connection in self._callers.asking_to_stop(readable):
+            self._request_id += 2  # odd: the supervisor's
+            self._stop_asked[self._request_id] = connection
+            self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
         if self._control_pipe in readable:
             while (message := self._control_pipe.receive()) is not None:
                 if isinstance(message, ModeReply):
                     self._confirm(message)
-
-    def _accept_stop(self) -> None:
-        connection, _ = self._arm_lock.accept()
-        connection.settimeout(0.1)
-        try:
-            asked = connection.recv(16)
-        except OSError:
-            asked = b""
-        if not asked.startswith(b"estop"):
-            connection.close()
-            return
-        self._request_id += 2  # odd: the supervisor's
-        self._stop_asked[self._request_id] = connection
-        self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
 
     def _confirm(self, reply: ModeReply) -> None:
         connection = self._stop_asked.pop(reply.request_id, None)
