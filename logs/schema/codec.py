@@ -7,6 +7,7 @@ from google.protobuf.message import DecodeError, Message
 from google.protobuf.unknown_fields import UnknownFieldSet
 
 from pneuarm.controllers.arm.errors import MessageRejected
+from pneuarm.logs.schema.printable import printable
 
 #: No message of ours comes near this size.
 MAX_PAYLOAD_BYTES = 65536
@@ -27,41 +28,48 @@ def is_json(encoding: str) -> bool:
     return encoding.split(";")[0] in (JSON, "text/json")
 
 
-def decode(message_type: type[M], payload: bytes, encoding: str) -> M:
-    """Read a message; raises MessageRejected with one sentence for anything that is not one."""
+def decode(message_type: type[M], payload: bytes, encoding: str, *, tolerant: bool = False) -> M:
+    """Read a message; raises MessageRejected with one sentence for anything that is not one.
+
+    What the daemon takes may hold nothing that it does not know. What it gives is read
+    ``tolerant``, so that a newer daemon may say more than an older client knows.
+    """
     name = message_type.DESCRIPTOR.full_name
-    if len(payload) > MAX_PAYLOAD_BYTES:
+    if len(payload) > MAX_PAYLOAD_BYTES and not tolerant:
         raise MessageRejected(
             f"payload of {len(payload)} bytes; at most {MAX_PAYLOAD_BYTES} are read"
         )
     schema = encoding.partition(";")[2]
     if schema and schema != name:
-        raise MessageRejected(f"message of type {schema!r}; this key takes {name}")
+        raise MessageRejected(f"message of type {schema[:100]!r}; this key takes {name}")
     message = message_type()
     try:
         if is_json(encoding):
-            json_format.Parse(payload.decode("utf-8"), message)
+            json_format.Parse(payload.decode("utf-8"), message, ignore_unknown_fields=tolerant)
         else:
             message.ParseFromString(payload)
-    except (json_format.ParseError, DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (json_format.Error, DecodeError, ValueError, RecursionError) as error:
         kind = "JSON" if is_json(encoding) else "protobuf"
-        # Half a surrogate pair in JSON cannot be written as UTF-8, so not into an event.
-        shown = str(error).encode("utf-8", "backslashreplace").decode()
-        detail = shown.splitlines()[0][:200]
+        detail = printable((str(error).splitlines() or [""])[0], 200)
         raise MessageRejected(f"payload is not the {kind} form of {name}: {detail}") from error
-    if _has_unknown_fields(message):
-        raise MessageRejected(f"payload has fields that {name} does not have; wrong message type?")
+    if not tolerant and _has_unknown_fields(message):
+        raise MessageRejected(
+            f"payload has fields that {name} does not have; a message of another type, or of a "
+            "newer client than this daemon?"
+        )
     return message
 
 
 def _has_unknown_fields(message: Message) -> bool:
+    """Look into every message inside too, also where there are many of them."""
     if len(UnknownFieldSet(message)) > 0:
         return True
-    return any(
-        _has_unknown_fields(value)
-        for _, value in message.ListFields()
-        if isinstance(value, Message)  # not the list of a repeated field
-    )
+    for field, value in message.ListFields():
+        if field.message_type is None or field.message_type.GetOptions().map_entry:
+            continue
+        if any(_has_unknown_fields(inner) for inner in (value if field.is_repeated else [value])):
+            return True
+    return False
 
 
 def encode(message: Message, encoding: str) -> bytes:

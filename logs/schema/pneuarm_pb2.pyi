@@ -338,7 +338,7 @@ class ModeRequest(_message.Message):
     def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., action: _Optional[_Union[Action, str]] = ..., take_over: bool = ...) -> None: ...
 
 class Reply(_message.Message):
-    __slots__ = ("accepted", "reason", "mode", "lease_secret", "lease_holder", "state_sequence", "refusal")
+    __slots__ = ("accepted", "reason", "mode", "lease_secret", "lease_holder", "state_sequence", "refusal", "nonce", "version")
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
@@ -346,6 +346,8 @@ class Reply(_message.Message):
     LEASE_HOLDER_FIELD_NUMBER: _ClassVar[int]
     STATE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     REFUSAL_FIELD_NUMBER: _ClassVar[int]
+    NONCE_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
     accepted: bool
     reason: str
     mode: Mode
@@ -353,10 +355,12 @@ class Reply(_message.Message):
     lease_holder: str
     state_sequence: int
     refusal: Refusal
-    def __init__(self, accepted: bool = ..., reason: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., lease_secret: _Optional[str] = ..., lease_holder: _Optional[str] = ..., state_sequence: _Optional[int] = ..., refusal: _Optional[_Union[Refusal, str]] = ...) -> None: ...
+    nonce: bytes
+    version: str
+    def __init__(self, accepted: bool = ..., reason: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., lease_secret: _Optional[str] = ..., lease_holder: _Optional[str] = ..., state_sequence: _Optional[int] = ..., refusal: _Optional[_Union[Refusal, str]] = ..., nonce: _Optional[bytes] = ..., version: _Optional[str] = ...) -> None: ...
 
 class ArmState(_message.Message):
-    __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "active_faults", "supply_pa", "measurement_age_s", "guard_range", "guard_slew", "guard_not_finite", "guard_too_old", "guard_supply", "reference_position_m", "reference_velocity_m_s", "reference_error_m", "tip_model_position_m", "tip_offset_m", "tip_offset_orientation_xyzw", "tip_estimated_sigma_m", "tip_estimated_source", "tip_poses_refused")
+    __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "active_faults", "supply_pa", "measurement_age_s", "guard_range", "guard_slew", "guard_not_finite", "guard_too_old", "guard_supply", "reference_position_m", "reference_velocity_m_s", "reference_error_m", "tip_model_position_m", "tip_offset_m", "tip_offset_orientation_xyzw", "tip_estimated_sigma_m", "tip_estimated_source", "tip_poses_refused", "log_missed")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     TIME_UNIX_NS_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
@@ -407,6 +411,7 @@ class ArmState(_message.Message):
     TIP_ESTIMATED_SIGMA_M_FIELD_NUMBER: _ClassVar[int]
     TIP_ESTIMATED_SOURCE_FIELD_NUMBER: _ClassVar[int]
     TIP_POSES_REFUSED_FIELD_NUMBER: _ClassVar[int]
+    LOG_MISSED_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     time_unix_ns: int
     mode: Mode
@@ -457,10 +462,11 @@ class ArmState(_message.Message):
     tip_estimated_sigma_m: float
     tip_estimated_source: EstimateSource
     tip_poses_refused: int
-    def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., active_faults: _Optional[int] = ..., supply_pa: _Optional[float] = ..., measurement_age_s: _Optional[float] = ..., guard_range: _Optional[int] = ..., guard_slew: _Optional[int] = ..., guard_not_finite: _Optional[int] = ..., guard_too_old: _Optional[int] = ..., guard_supply: _Optional[int] = ..., reference_position_m: _Optional[_Iterable[float]] = ..., reference_velocity_m_s: _Optional[_Iterable[float]] = ..., reference_error_m: _Optional[float] = ..., tip_model_position_m: _Optional[_Iterable[float]] = ..., tip_offset_m: _Optional[_Iterable[float]] = ..., tip_offset_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_estimated_sigma_m: _Optional[float] = ..., tip_estimated_source: _Optional[_Union[EstimateSource, str]] = ..., tip_poses_refused: _Optional[int] = ...) -> None: ...
+    log_missed: int
+    def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., active_faults: _Optional[int] = ..., supply_pa: _Optional[float] = ..., measurement_age_s: _Optional[float] = ..., guard_range: _Optional[int] = ..., guard_slew: _Optional[int] = ..., guard_not_finite: _Optional[int] = ..., guard_too_old: _Optional[int] = ..., guard_supply: _Optional[int] = ..., reference_position_m: _Optional[_Iterable[float]] = ..., reference_velocity_m_s: _Optional[_Iterable[float]] = ..., reference_error_m: _Optional[float] = ..., tip_model_position_m: _Optional[_Iterable[float]] = ..., tip_offset_m: _Optional[_Iterable[float]] = ..., tip_offset_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_estimated_sigma_m: _Optional[float] = ..., tip_estimated_source: _Optional[_Union[EstimateSource, str]] = ..., tip_poses_refused: _Optional[int] = ..., log_missed: _Optional[int] = ...) -> None: ...
 
 class Event(_message.Message):
-    __slots__ = ("time_unix_ns", "level", "source", "code", "text", "cause", "remedy", "client_id", "mode", "payload", "key", "target_sequence")
+    __slots__ = ("time_unix_ns", "level", "source", "code", "text", "cause", "remedy", "client_id", "mode", "payload", "key", "target_sequence", "repeats")
     TIME_UNIX_NS_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
@@ -473,6 +479,7 @@ class Event(_message.Message):
     PAYLOAD_FIELD_NUMBER: _ClassVar[int]
     KEY_FIELD_NUMBER: _ClassVar[int]
     TARGET_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    REPEATS_FIELD_NUMBER: _ClassVar[int]
     time_unix_ns: int
     level: Level
     source: str
@@ -485,7 +492,16 @@ class Event(_message.Message):
     payload: bytes
     key: str
     target_sequence: int
-    def __init__(self, time_unix_ns: _Optional[int] = ..., level: _Optional[_Union[Level, str]] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., cause: _Optional[str] = ..., remedy: _Optional[str] = ..., client_id: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., payload: _Optional[bytes] = ..., key: _Optional[str] = ..., target_sequence: _Optional[int] = ...) -> None: ...
+    repeats: int
+    def __init__(self, time_unix_ns: _Optional[int] = ..., level: _Optional[_Union[Level, str]] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., cause: _Optional[str] = ..., remedy: _Optional[str] = ..., client_id: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., payload: _Optional[bytes] = ..., key: _Optional[str] = ..., target_sequence: _Optional[int] = ..., repeats: _Optional[int] = ...) -> None: ...
+
+class Events(_message.Message):
+    __slots__ = ("recent", "latched")
+    RECENT_FIELD_NUMBER: _ClassVar[int]
+    LATCHED_FIELD_NUMBER: _ClassVar[int]
+    recent: _containers.RepeatedCompositeFieldContainer[Event]
+    latched: _containers.RepeatedCompositeFieldContainer[Event]
+    def __init__(self, recent: _Optional[_Iterable[_Union[Event, _Mapping]]] = ..., latched: _Optional[_Iterable[_Union[Event, _Mapping]]] = ...) -> None: ...
 
 class ProcessHealth(_message.Message):
     __slots__ = ("name", "pid", "cpu_share", "memory_bytes", "dropped", "restarts")

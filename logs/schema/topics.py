@@ -46,8 +46,9 @@ BODY = Topic("body", "file", PointCloud, logged_rate_hz=20.0)
 HEALTH = Topic("health", "out", pb.Health, 1.0, newest=True)
 EVENT = Topic("event", "out", pb.Event, when="when it happens")
 INFO = Topic("info", "query", pb.Info, when="when needed")
+EVENTS = Topic("events", "query", pb.Events, logged=False, when="when needed")
 
-TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, BODY, HEALTH, EVENT, INFO)
+TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, BODY, HEALTH, EVENT, INFO, EVENTS)
 LOGGED = tuple(topic for topic in TOPICS if topic.logged)
 
 #: Liveliness tokens.

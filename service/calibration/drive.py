@@ -12,6 +12,7 @@ from pneuarm.controllers.calibration.plan import Move, duration_s
 from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.printable import name_of
 from pneuarm.service.calibration.recordings import recording_of
 from pneuarm.service.client.client import Client
 
@@ -79,7 +80,7 @@ def _moved(
 
 def _require_going_on(state: pb.ArmState) -> None:
     if state.mode != pb.ACTIVE:
-        mode = pb.Mode.Name(state.mode).lower()
+        mode = name_of(pb.Mode, state.mode)
         raise ModeRefused(
             f"the arm went to mode {mode} in the middle of the calibration; nothing was written"
         )

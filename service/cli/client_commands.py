@@ -10,6 +10,8 @@ from google.protobuf.message import Message
 
 from pneuarm.controllers.arm.errors import DaemonUnreachable, ModeRefused, NotConfirmed
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.event_line import event_line
+from pneuarm.logs.schema.printable import name_of
 from pneuarm.service.cli.shape_arguments import duration_s, shape_of
 from pneuarm.service.cli.text import outcome, radians, state_line
 from pneuarm.service.client.client import Client
@@ -69,7 +71,7 @@ def send(arguments: argparse.Namespace) -> int:
     with _connect(arguments) as client:
         if client.state().mode != pb.ACTIVE or arguments.take_over:
             if not arguments.enable:
-                mode = pb.Mode.Name(client.state().mode).lower()
+                mode = name_of(pb.Mode, client.state().mode)
                 raise ModeRefused(f"the arm is in mode {mode}; add --enable to arm it first")
             client.enable(arguments.take_over)
         else:
@@ -104,7 +106,7 @@ def mode(arguments: argparse.Namespace) -> int:
             "reset": client.reset,
         }
         reply = actions[arguments.command]()
-    _show(arguments, reply, f"mode is {pb.Mode.Name(reply.mode).lower()}")
+    _show(arguments, reply, f"mode is {name_of(pb.Mode, reply.mode)}")
     return 0
 
 
@@ -131,8 +133,12 @@ def state(arguments: argparse.Namespace) -> int:
     """Show the newest state, or all of them as they come."""
     with _connect(arguments) as client:
         if not arguments.follow:
-            newest = client.state()
-            _show(arguments, newest, state_line(newest))
+            newest, latched = client.state(), client.past_events().latched
+            if arguments.json:
+                told = [json.loads(_as_json(event)) for event in latched]
+                print(json.dumps(json.loads(_as_json(newest)) | {"latched_events": told}))
+            else:
+                print("\n".join([state_line(newest), *(event_line(event) for event in latched)]))
             return 0
         last_s = 0.0
         for newest in client.states():

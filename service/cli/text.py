@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.printable import name_of
 
 
 def millimetres(values_m: Iterable[float]) -> str:
@@ -27,16 +28,18 @@ def state_line(state: pb.ArmState) -> str:
     """One line: number, mode, tip, target, lengths, pressures."""
     parts = [
         f"#{state.sequence}",
-        pb.Mode.Name(state.mode).lower(),
+        name_of(pb.Mode, state.mode),
         f"tip {millimetres(state.tip_estimated_position_m)} mm",
     ]
     if state.target_kind != pb.NO_TARGET:
-        kind = pb.TargetKind.Name(state.target_kind).lower()
-        reach = pb.Reach.Name(state.reach).lower().replace("_", " ")
+        kind = name_of(pb.TargetKind, state.target_kind)
+        reach = name_of(pb.Reach, state.reach).replace("_", " ")
         goal = f" {millimetres(state.target_position_m)} mm" if state.target_position_m else ""
         parts.append(f"{kind}{goal} {reach}, error {1e3 * state.target_error_m:.2f} mm")
     parts.append(f"lengths {millimetres(state.length_estimated_m)} mm")
     parts.append(f"pressures {bars(state.pressure_measured_pa)} bar")
+    if state.log_missed:
+        parts.append(f"THE LOG LACKS {state.log_missed} records")
     return "  ".join(parts)
 
 

@@ -5,6 +5,7 @@ hangs stops refreshing its target, and the arm holds.
 """
 
 import contextlib
+import os
 import socket
 import time
 import uuid
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
+from pneuarm import __version__
 from pneuarm.controllers.arm.errors import (
     DaemonUnreachable,
     LeaseRefused,
@@ -27,10 +29,12 @@ from pneuarm.controllers.arm.errors import (
 )
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode, encoding_of
+from pneuarm.logs.schema.printable import name_of, printable
 from pneuarm.logs.schema.topics import (
     ALIVE_CLIENT,
     ESTOP,
     EVENT,
+    EVENTS,
     INFO,
     MODE,
     STATE,
@@ -49,6 +53,9 @@ from pneuarm.service.network import sessions as network
 _QUERY_S = 2.0
 _REFRESH_S = 0.02
 
+#: A stop that is not answered for so long is sent again.
+_STOP_AGAIN_S = 0.25
+
 #: A stop is sent before everything else, and waits for room rather than being dropped.
 _URGENT: dict[str, Any] = {
     "priority": zenoh.Priority.REAL_TIME,
@@ -62,6 +69,25 @@ _REFUSALS: dict[int, type[PneuarmError]] = {
 }
 
 M = TypeVar("M", bound=Message)
+
+
+def new_client_id(name: str = "") -> str:
+    """Return a name for one client: its program, this machine, and a number, 64 characters at most.
+
+    What no key or terminal takes becomes a dash.
+    """
+    parts = (name or "client")[:32], socket.gethostname()[:24]
+    program, machine = (
+        "".join(c if c.isprintable() and c not in "/*$?#" else "-" for c in part) for part in parts
+    )
+    return f"{program}@{machine}-{uuid.uuid4().hex[:6]}"
+
+
+def _versions_apart(daemons: str) -> str:
+    """Say so where daemon and client are of different versions."""
+    if not daemons or daemons == __version__:
+        return ""
+    return f" (the daemon is pneuarm {printable(daemons, 32)}, this client {__version__})"
 
 
 class Client:
@@ -79,7 +105,8 @@ class Client:
         zenoh_config_file: str = "",
     ) -> None:
         self.arm = arm
-        self.client_id = f"{name or 'client'}@{socket.gethostname()}-{uuid.uuid4().hex[:6]}"
+        self.client_id = new_client_id(name)
+        self._process = os.getpid()
         self._session = network.open_connected(connect, zenoh_config_file)
         self._secret = ""
         self._sequence = 0
@@ -127,8 +154,8 @@ class Client:
 
     def close(self) -> None:
         """Give the lease back, if this client has it, and close the connection."""
-        if self._session.is_closed():
-            return
+        if os.getpid() != self._process or self._session.is_closed():
+            return  # of a parent's session, a forked process holds no more than the memory
         with contextlib.suppress(PneuarmError):
             if self._secret:
                 self.release()
@@ -138,6 +165,7 @@ class Client:
 
     def state(self, timeout_s: float = 2.0) -> pb.ArmState:
         """Return the newest state; raises DaemonUnreachable if none comes in time."""
+        self._check_process()
         waited_until = time.monotonic() + timeout_s
         while True:
             sample = self._states.try_recv()
@@ -174,27 +202,66 @@ class Client:
 
     def events(self) -> list[pb.Event]:
         """Return the events since the last call."""
+        self._check_process()
         found = []
         while (sample := self._events.try_recv()) is not None:
             with contextlib.suppress(MessageRejected):  # no event: not the daemon's
-                found.append(decode(pb.Event, sample.payload.to_bytes(), str(sample.encoding)))
+                payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
+                found.append(decode(pb.Event, payload, encoding, tolerant=True))
         return found
+
+    def past_events(self) -> pb.Events:
+        """Return what was told before this client came.
+
+        ``recent`` are the newest events, oldest first; ``latched`` are those that led to the fault
+        or the stop that is latched now, the cause first, empty where nothing is.
+        """
+        return self._query(EVENTS, pb.ModeRequest(), pb.Events())
 
     def info(self) -> pb.Info:
         """Return configuration, limits and versions of the daemon."""
         return self._query(INFO, pb.ModeRequest(), pb.Info())
 
     def _query(self, topic: Topic, request: Message, answer: M) -> M:
+        payload, encoding = request.SerializeToString(), encoding_of(request)
+        for found in self._ask(topic, payload, type(answer), _QUERY_S, encoding=encoding):
+            return found
+        raise DaemonUnreachable(
+            f"the daemon of arm {self.arm!r} does not answer {topic.key}; where its Zenoh file has "
+            "access control, this client's certificate may not be allowed to ask"
+        )
+
+    def _ask(
+        self, topic: Topic, payload: bytes, answer: type[M], timeout_s: float, **options: Any
+    ) -> Iterator[M]:
+        """Yield the daemon's answers: what others answer under its key is passed over."""
+        self._check_process()
         replies = self._session.get(
             self._key(topic),
-            payload=request.SerializeToString(),
-            encoding=encoding_of(request),
-            timeout=_QUERY_S,
+            payload=payload,
+            timeout=timeout_s,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            **options,
         )
         for reply in replies:
-            if reply.ok is not None:
-                return decode(type(answer), reply.ok.payload.to_bytes(), str(reply.ok.encoding))
-        raise DaemonUnreachable(f"the daemon of arm {self.arm!r} does not answer")
+            source = reply.replier_id
+            zid = getattr(source, "zid", source)  # older versions of Zenoh return it itself
+            if zid not in self._session.info.routers_zid():
+                continue
+            if reply.ok is None:
+                raise DaemonUnreachable(printable(reply.err.payload.to_string()))
+            encoding = str(reply.ok.encoding)
+            yield decode(answer, reply.ok.payload.to_bytes(), encoding, tolerant=True)
+
+    def _check_process(self) -> None:
+        """Raise DaemonUnreachable in a process forked from this client's: it would hang there."""
+        if os.getpid() != self._process:
+            raise DaemonUnreachable(
+                f"this client was opened by process {self._process}, and this is one forked from "
+                "it; a Zenoh session does not survive a fork: open a Client here before any other, "
+                'or start processes with multiprocessing.get_context("spawn")'
+            )
 
     # --- modes -----------------------------------------------------------------------------
 
@@ -209,7 +276,9 @@ class Client:
         if reply.lease_secret:
             self._secret = reply.lease_secret
         if not reply.accepted:
-            raise _REFUSALS.get(reply.refusal, ModeRefused)(reply.reason)
+            raise _REFUSALS.get(reply.refusal, ModeRefused)(
+                printable(reply.reason) + _versions_apart(reply.version)
+            )
         self._wait_for(reply.state_sequence)
         return reply
 
@@ -252,18 +321,39 @@ class Client:
         return reply
 
     def estop(self, timeout_s: float = 1.0) -> pb.ArmState:
-        """Stop; return the state that shows it, or raise NotConfirmed."""
-        self._session.put(self._key(ESTOP), b"estop", **_URGENT)
-        waited_until = time.monotonic() + timeout_s
+        """Stop; return the state that shows it, or raise NotConfirmed.
+
+        It is confirmed by the daemon's own answer to this very stop; a state that anybody may have
+        published confirms nothing.
+        """
+        try:
+            self._check_process()
+        except DaemonUnreachable as error:
+            raise NotConfirmed(f"NOT CONFIRMED: {error}; cut the air supply") from error
+        nonce, until = os.urandom(16), time.monotonic() + timeout_s
+        with contextlib.suppress(DaemonUnreachable, MessageRejected, zenoh.ZError):
+            self._session.put(self._key(ESTOP), nonce, **_URGENT)
+            while (left_s := until - time.monotonic()) > 0.0:
+                for reply in self._ask(
+                    ESTOP, nonce, pb.Reply, min(left_s, _STOP_AGAIN_S), **_URGENT
+                ):
+                    if reply.accepted and reply.mode == pb.ESTOP and reply.nonce == nonce:
+                        return self._stopped(reply, until)
+                time.sleep(0.01)  # nobody takes the question: no daemon, or one that starts
+        raise NotConfirmed(
+            f"NOT CONFIRMED: the daemon of arm {self.arm!r} did not answer the stop; cut the air "
+            "supply"
+        )
+
+    def _stopped(self, reply: pb.Reply, until_s: float) -> pb.ArmState:
+        """Return the state of the tick that stopped, or what the answer tells of it."""
         with contextlib.suppress(DaemonUnreachable):
-            while time.monotonic() < waited_until:
-                state = self.state(timeout_s=0.2)
-                if state.mode == pb.ESTOP:
+            while (left_s := until_s - time.monotonic()) > 0.0:
+                state = self.state(left_s)
+                if state.mode == pb.ESTOP and state.sequence >= reply.state_sequence:
                     return state
                 time.sleep(0.002)
-        raise NotConfirmed(
-            f"NOT CONFIRMED: no state of arm {self.arm!r} shows the stop; cut the air supply"
-        )
+        return pb.ArmState(sequence=reply.state_sequence, mode=pb.ESTOP)
 
     # --- targets ---------------------------------------------------------------------------
 
@@ -272,6 +362,7 @@ class Client:
 
         It must be sent again before the daemon's target timeout (200 ms), or the arm holds.
         """
+        self._check_process()
         self._sequence += 1
         target.client_id = self.client_id
         target.lease_secret = self._secret
@@ -332,7 +423,7 @@ class Client:
             state = self.state()
             self.raise_if_refused(first)
             if state.mode != pb.ACTIVE:
-                mode = pb.Mode.Name(state.mode).lower()
+                mode = name_of(pb.Mode, state.mode)
                 raise ModeRefused(f"the arm is in mode {mode} and follows no target; enable it")
             if state.target_sequence >= first and state.reach in (pb.REACHED, pb.OUT_OF_REACH):
                 return state
@@ -350,4 +441,4 @@ class Client:
             # A refused request was raised by its own call; its event may come after that.
             ours = event.client_id == self.client_id and event.key == TARGET.key
             if ours and event.code == "rejected" and event.target_sequence >= first:
-                raise TargetRejected(event.text)
+                raise TargetRejected(printable(event.text))

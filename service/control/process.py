@@ -22,6 +22,7 @@ from pneuarm.service.processes import realtime
 from pneuarm.service.processes.device_slots import LinkedDevice
 from pneuarm.service.processes.pipe import Command, ModeReply, Pipe, Shutdown
 from pneuarm.service.processes.shared import REALTIME, START_FAILED, Shared, ignore_terminal_signals
+from pneuarm.service.processes.telling import Telling
 
 #: How long the loop goes on venting after it was told to end, at most.
 VENT_BEFORE_END_S = 2.0
@@ -41,6 +42,7 @@ class ControlProcess:
         arm = configuration.build_arm()
         self._ring = RingWriter(shared.rings.ticks)
         self._events = MessageWriter(shared.rings.control)
+        self._telling = Telling(self._write)
         self._hardware: Hardware | LinkedDevice = (
             backends.build(configuration, arm)
             if shared.device is None
@@ -57,6 +59,9 @@ class ControlProcess:
         self._ending_since_ns: int | None = None
 
     def _emit(self, event: pb.Event) -> None:
+        self._telling.tell(event)
+
+    def _write(self, event: pb.Event) -> None:
         self._events.write(EVENT, event, event.time_unix_ns)
 
     def run(self) -> None:
@@ -89,7 +94,7 @@ class ControlProcess:
             wake = clock.wait()
             begin = time.monotonic_ns()
             overruns += wake.skipped
-            timing = Timing(wake.late_ns * 1e-9, compute_s, overruns)
+            timing = Timing(wake.late_ns * 1e-9, compute_s, overruns, self._shared.recorder.missed)
             self._tick(wake.due_ns, timing)
             compute_s = (time.monotonic_ns() - begin) * 1e-9
 
@@ -100,6 +105,7 @@ class ControlProcess:
         self._ring.write(record)
         for reply in replies:
             self._reply(reply)
+        self._telling.step(self._shared.unix_ns(due_ns))
 
     def _reply(self, reply: ModeReply) -> None:
         """Answer whoever asked: even numbers are the gateway's, odd ones the supervisor's."""

@@ -2,18 +2,21 @@
 
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
+from dataclasses import dataclass
 
 from pneuarm.logs.rings.rings import MessageReader, Rings
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.event_line import event_line
 from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import rerun_url
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.network.sessions import is_loopback
 from pneuarm.service.processes.shared import REALTIME, START_FAILED, Shared
+from pneuarm.service.processes.telling import sameness
 
 #: Lines a second; a flood of bad messages must not become a flood of lines.
 _LINES_PER_S = 10
+_LONGEST_PAUSE_S = 60.0
 
 
 def start_facts(shared: Shared, realtime: str) -> list[str]:
@@ -44,13 +47,27 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
     return lines
 
 
+@dataclass
+class _Lasting:
+    """An event that goes on: the newest of it that is not printed yet, and how many there were."""
+
+    printed_s: float
+    pause_s: float = 2.0
+    newest: pb.Event | None = None
+    repeats: int = 0
+
+
 class Announcer:
-    """Prints events as they come, at most _LINES_PER_S a second; errors always."""
+    """Prints events as they come, at most _LINES_PER_S a second; errors always.
+
+    What goes on is printed again after 2 s, then after twice as long each time, up to a minute.
+    """
 
     def __init__(self, rings: Rings, say: Callable[[str], None]) -> None:
         self._reader = MessageReader(rings.messages())
         self._say = say
         self._second, self._lines, self._withheld = 0, 0, 0
+        self._lasting: dict[tuple[str, str, str], _Lasting] = {}
 
     def step(self) -> None:
         """Print what is new."""
@@ -58,9 +75,29 @@ class Announcer:
             if topic is EVENT:
                 event = pb.Event.FromString(payload)
                 if event.code not in (REALTIME, START_FAILED):
-                    self._event(event)
+                    self._take(event)
+        self._print_lasting(time.monotonic())
 
-    def _event(self, event: pb.Event) -> None:
+    def _take(self, event: pb.Event) -> None:
+        lasting = self._lasting.get(sameness(event))
+        if event.repeats and lasting is not None:
+            lasting.newest, lasting.repeats = event, lasting.repeats + event.repeats
+        else:
+            self._lasting[sameness(event)] = _Lasting(time.monotonic())
+            self._print(event)
+
+    def _print_lasting(self, now_s: float) -> None:
+        for key, lasting in list(self._lasting.items()):
+            if now_s - lasting.printed_s < lasting.pause_s:
+                continue
+            if lasting.newest is None:
+                del self._lasting[key]
+                continue
+            lasting.newest.repeats = lasting.repeats
+            self._print(lasting.newest)
+            self._lasting[key] = _Lasting(now_s, min(2.0 * lasting.pause_s, _LONGEST_PAUSE_S))
+
+    def _print(self, event: pb.Event) -> None:
         second = int(time.monotonic())
         if second != self._second:
             if self._withheld:
@@ -71,17 +108,3 @@ class Announcer:
             self._withheld += 1
         else:
             self._say(event_line(event))
-
-
-def event_line(event: pb.Event) -> str:
-    """One event for a terminal: time, level, who, what, why, what to do."""
-    clock = datetime.fromtimestamp(event.time_unix_ns / 1e9, UTC).strftime("%H:%M:%S.%f")[:-3]
-    level = pb.Level.Name(event.level).lower()
-    line = f"{clock} {level:7} {event.source}: {event.text}"
-    if event.client_id:
-        line += f" [{event.client_id}]"
-    if event.cause:
-        line += f" (cause: {event.cause})"
-    if event.remedy:
-        line += f" -> {event.remedy}"
-    return line

@@ -8,10 +8,16 @@ however it ends, and they leave no file behind. Whoever connects to the arm's so
 import contextlib
 import socket
 import struct
+import time
+from collections.abc import Sequence
 
 from pneuarm.controllers.arm.errors import AlreadyInUse, DaemonUnreachable, NotConfirmed
 
 _CONFIRM_S = 1.0
+
+#: Who connects and says nothing is forgotten after so long, or when so many have come after it.
+_SILENT_S = 1.0
+_MOST_CALLERS = 128
 
 
 def _address(kind: str, name: str) -> str:
@@ -32,7 +38,7 @@ def lock(kind: str, name: str) -> socket.socket:
             f"name another {kind}",
             process_id,
         ) from error
-    listener.listen(8)
+    listener.listen(_MOST_CALLERS)
     return listener
 
 
@@ -44,6 +50,63 @@ def _holder(kind: str, name: str) -> int | None:
         credentials = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
         return int(struct.unpack("3i", credentials)[0])
     return None
+
+
+class Callers:
+    """The supervisor's end of an arm's socket: who speaks is heard, who is silent delays nobody."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        listener.setblocking(False)
+        self._silent: dict[socket.socket, float] = {}  # since when, oldest first
+
+    def sockets(self) -> list[socket.socket]:
+        """What is to be watched for something to read."""
+        return [self._listener, *self._silent]
+
+    def asking_to_stop(self, readable: Sequence[object]) -> list[socket.socket]:
+        """Return the connections that now ask to stop; each is to be answered and closed."""
+        if self._listener in readable:
+            self._accept()
+        self._forget()
+        return [caller for caller in list(self._silent) if self._asks_to_stop(caller)]
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):  # nobody is left, or there is no descriptor for it
+            for _ in range(_MOST_CALLERS):
+                caller, _ = self._listener.accept()
+                caller.setblocking(False)
+                self._silent[caller] = time.monotonic()
+
+    def _forget(self) -> None:
+        now_s, surplus = time.monotonic(), len(self._silent) - _MOST_CALLERS
+        for number, (caller, since_s) in enumerate(list(self._silent.items())):
+            if (number < surplus or now_s - since_s > _SILENT_S) and not self._speaks(caller):
+                self._end(caller)
+
+    @staticmethod
+    def _speaks(caller: socket.socket) -> bool:
+        try:
+            return bool(caller.recv(1, socket.MSG_PEEK))
+        except OSError:
+            return False
+
+    def _asks_to_stop(self, caller: socket.socket) -> bool:
+        try:
+            asked = caller.recv(16)
+        except BlockingIOError:
+            return False  # silent as yet
+        except OSError:
+            asked = b""
+        if not asked.startswith(b"estop"):
+            self._end(caller)
+            return False
+        del self._silent[caller]
+        return True
+
+    def _end(self, caller: socket.socket) -> None:
+        del self._silent[caller]
+        caller.close()
 
 
 def stop_locally(arm_name: str) -> None:

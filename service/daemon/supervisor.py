@@ -9,6 +9,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from multiprocessing import get_context
 
 from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
@@ -21,7 +22,7 @@ from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import Configuration, log_directory
 from pneuarm.service.daemon.announce import Announcer, start_facts
 from pneuarm.service.daemon.info import info_of
-from pneuarm.service.daemon.local_stop import lock
+from pneuarm.service.daemon.local_stop import Callers, lock
 from pneuarm.service.daemon.log_watch import LogWatch
 from pneuarm.service.daemon.repair import start_mending
 from pneuarm.service.daemon.sd_notify import ServiceManager
@@ -34,6 +35,7 @@ from pneuarm.service.processes.device_slots import DeviceLink
 from pneuarm.service.processes.pipe import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from pneuarm.service.processes.shared import ENDING_SIGNALS, REALTIME, START_FAILED, Shared
 from pneuarm.service.processes.usage import ProcessTable
+from pneuarm.service.wire.tip_pose_source import read_key
 
 _PERIOD_S = 0.02
 
@@ -42,8 +44,8 @@ HEARTBEAT_S = 0.1
 _FIRST_TICK_S = 20.0
 _END_S = 5.0
 
-#: A recorder that gets no further for this long at the end is stuck.
-_RECORDER_PATIENCE_S = 30.0
+#: A recorder that still gets further after this much of the end asks for more time than usual.
+_LONG_END_S = 10.0
 
 #: The end takes no longer than this, but for a recorder that still gets further: more than all its
 #: patience together.
@@ -69,6 +71,7 @@ class Supervisor:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
         self._say = say
         self._arm_lock = lock("arm", configuration.arm.name)
+        self._callers = Callers(self._arm_lock)
         backends.check(configuration)
         self._device_lock = lock("device", backends.address(configuration))
         self._check_ports(configuration)
@@ -94,6 +97,7 @@ class Supervisor:
     @staticmethod
     def _check_ports(configuration: Configuration) -> None:
         read_config(configuration.zenoh.config_file)
+        read_key(configuration.feedback)
         for endpoint in configuration.zenoh.listen:
             check_free("zenoh.listen", endpoint)
         if configuration.rerun.enabled and configuration.rerun.start_server:
@@ -289,28 +293,16 @@ class Supervisor:
     # --- the stop from this machine --------------------------------------------------------
 
     def _serve_local_stop(self, timeout_s: float) -> None:
-        watched: list[socket.socket | Pipe] = [self._arm_lock, self._control_pipe]
+        watched: list[socket.socket | Pipe] = [*self._callers.sockets(), self._control_pipe]
         readable, _, _ = select.select(watched, [], [], timeout_s)
-        if self._arm_lock in readable:
-            self._accept_stop()
+        for connection in self._callers.asking_to_stop(readable):
+            self._request_id += 2  # odd: the supervisor's
+            self._stop_asked[self._request_id] = connection
+            self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
         if self._control_pipe in readable:
             while (message := self._control_pipe.receive()) is not None:
                 if isinstance(message, ModeReply):
                     self._confirm(message)
-
-    def _accept_stop(self) -> None:
-        connection, _ = self._arm_lock.accept()
-        connection.settimeout(0.1)
-        try:
-            asked = connection.recv(16)
-        except OSError:
-            asked = b""
-        if not asked.startswith(b"estop"):
-            connection.close()
-            return
-        self._request_id += 2  # odd: the supervisor's
-        self._stop_asked[self._request_id] = connection
-        self._control_pipe.send(RequestMode(ModeEvent.ESTOP, self._request_id, "this machine"))
 
     def _confirm(self, reply: ModeReply) -> None:
         connection = self._stop_asked.pop(reply.request_id, None)
@@ -326,6 +318,7 @@ class Supervisor:
         # Nothing below waits without a limit; should the end stand still all the same, this says
         # where, and ends it: control vents by itself when its supervisor is gone.
         faulthandler.dump_traceback_later(LAST_RESORT_S, exit=True)
+        self._end_began_s = time.monotonic()
         control = self._children.get("control")
         if control is not None:
             self._control_pipe.send(Shutdown())
@@ -336,25 +329,27 @@ class Supervisor:
             child = self._children.get(name)
             if child is not None and name != "recorder":  # which has something to write
                 child.end_if_loading()
-            if child is not None and not child.end(*self._patience(name)):
+            progress = partial(self._progress, name)
+            if child is not None and not child.end(self._patience_s(name), progress):
                 self._say(f"WARNING    the {name} process did not end by itself and was killed")
         self._announcer.step()
         if "recorder" in self._children and (lacks := self._log_watch.lacks()):
             self._say(f"WARNING    {lacks}")
 
-    def _patience(self, name: str) -> tuple[float, Callable[[], object]]:
-        """How long a process may take to end, from where it was last seen to get further."""
-        if name == "recorder":
-            return _RECORDER_PATIENCE_S, self._recorded
-        return (6.0 if name == "device" else 2.0), lambda: None
+    @staticmethod
+    def _patience_s(name: str) -> float:
+        """How long a process may take to end, or to get further with what it still has to do."""
+        return {"recorder": 30.0, "device": 6.0}.get(name, 2.0)
 
-    def _recorded(self) -> object:
-        """Say how far the recorder is; as long as it gets further, nobody ends the end."""
+    def _progress(self, name: str) -> object:
+        """Say how far a process is; as long as the recorder gets further, nobody ends the end."""
+        if name != "recorder":
+            return None
         recorded = self._log_watch.recorded()
-        if recorded != self._last_recorded:
-            self._last_recorded = recorded
+        if recorded != self._last_recorded and time.monotonic() - self._end_began_s > _LONG_END_S:
             faulthandler.dump_traceback_later(LAST_RESORT_S, exit=True)
             self._service_manager.needs_longer(LAST_RESORT_S)
+        self._last_recorded = recorded
         return recorded
 
     _last_recorded: object = None

@@ -27,8 +27,9 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
 from pneuarm.logs.schema.topics import STATE, TIP_POSE, full_key
 from pneuarm.service.client.client import Client
-from pneuarm.service.configuration.configuration import check
+from pneuarm.service.configuration.configuration import Configuration, check
 from pneuarm.service.network import sessions as network
+from pneuarm.service.wire.tip_pose_source import read_key, signature
 
 #: Without a state for so long (s) there is no daemon.
 _PATIENCE_S = 3.0
@@ -94,29 +95,38 @@ def emulate_camera(arguments: argparse.Namespace) -> int:
         if not 0.0 <= value < 1e4 or (name == "rate" and value <= 0.0):
             raise InvalidInput(f"--{name.replace('_', '-')} {value:g}: a number above 0 is needed")
     delay_s, noise_m = 1e-3 * arguments.delay_ms, 1e-3 * arguments.noise_mm
-    frames = _frames(arguments)
+    configuration = _configuration(arguments)
+    frames, feedback = configuration.frames.frames(), configuration.feedback
     camera = Camera(arguments.rate, delay_s, noise_m, arguments.seed, frames)
+    key = full_key(arguments.arm, f"{TIP_POSE.key}/{feedback.tip_pose_source or 'camera'}")
+    secret = read_key(feedback)
     session = network.open_connected(arguments.connect)
     try:
-        count = _publish(session, camera, arguments)
+        count = _publish(session, camera, arguments, key, secret)
     finally:
         session.close()
     print(f"{count} poses published")
     return 0
 
 
-def _frames(arguments: argparse.Namespace) -> Mountings:
-    """Ask the daemon where motion capture, marker and tool are."""
+def _configuration(arguments: argparse.Namespace) -> Configuration:
+    """Ask the daemon where motion capture, marker and tool are, and under which name to publish."""
     with Client(arguments.arm, arguments.connect, "camera") as client:
-        return check(tomllib.loads(client.info().config_toml), "the daemon").frames.frames()
+        return check(tomllib.loads(client.info().config_toml), "the daemon")
 
 
-def _publish(session: "zenoh.Session", camera: Camera, arguments: argparse.Namespace) -> int:
+def _publish(
+    session: "zenoh.Session",
+    camera: Camera,
+    arguments: argparse.Namespace,
+    key: str,
+    secret: bytes,
+) -> int:
     states = session.declare_subscriber(
         full_key(arguments.arm, STATE.key), zenoh.handlers.RingChannel(1)
     )
     poses = session.declare_publisher(
-        full_key(arguments.arm, TIP_POSE.key),
+        key,
         encoding=encoding_of(PoseInFrame()),
         congestion_control=zenoh.CongestionControl.DROP,
         express=True,
@@ -136,7 +146,8 @@ def _publish(session: "zenoh.Session", camera: Camera, arguments: argparse.Names
                 "s; start the daemon with `pneuarm run`, or name the arm with --arm"
             )
         while (pose := camera.due(now_s)) is not None:
-            poses.put(pose.SerializeToString())
+            payload = pose.SerializeToString()
+            poses.put(payload, attachment=signature(secret, payload) if secret else None)
             count += 1
         time.sleep(_POLL_S)
     return count

@@ -1,7 +1,13 @@
-"""What clients stream in: targets and measured tip poses, checked before they go to control."""
+"""What clients stream in: targets and measured tip poses, checked before they go to control.
+
+The cheapest check comes first, and who holds the lease before what it asks for. All who do not
+hold it share one allowance of computing time, the holder has one of its own.
+"""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import zenoh
@@ -15,20 +21,29 @@ from pneuarm.controllers.workspace.reachability import Reachability
 from pneuarm.controllers.workspace.workspace import Workspace
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode
-from pneuarm.logs.schema.topics import TARGET, TIP_POSE
+from pneuarm.logs.schema.topics import TARGET, TIP_POSE, full_key
 from pneuarm.service.processes.pipe import Pipe, SetTarget, SetTipPose
 from pneuarm.service.processes.shared import Shared
+from pneuarm.service.wire.allowance import Allowance
 from pneuarm.service.wire.gateway_events import Notes
 from pneuarm.service.wire.lease import Lease
+from pneuarm.service.wire.mailbox import last_resort, serve
 from pneuarm.service.wire.publisher import Publisher
 from pneuarm.service.wire.target_checks import TargetChecker
-from pneuarm.service.wire.tip_pose_source import PosePublisher
+from pneuarm.service.wire.tip_pose_source import TipPoseSource, read_key, source_of
 
 #: A client may have seen states that this process has not read from the ring yet.
 _AHEAD_TICKS = 1000
 
 #: For a moving target out of reach the nearest point is searched this often at most.
 _SEARCH_EVERY_NS = 100_000_000
+
+#: Share of one core that messages may cost: those of the lease's holder, of motion capture, and of
+#: all others together.
+_HOLDERS_SHARE, _POSES_SHARE, _STRANGERS_SHARE = 0.6, 0.3, 0.1
+
+#: What waits to be read, at most; the newest are kept.
+_WAITING = 64
 
 
 class Inbox:
@@ -42,7 +57,12 @@ class Inbox:
         configuration = shared.configuration
         arm, frames = configuration.build_arm(), configuration.frames.frames()
         self._checker = TargetChecker(arm, frames, configuration.reference.limits())
-        self._publisher_of_poses = PosePublisher()
+        feedback = configuration.feedback
+        self._source = TipPoseSource(feedback.tip_pose_source, read_key(feedback))
+        self._told_open = False
+        self._holders = Allowance(_HOLDERS_SHARE)
+        self._poses = Allowance(_POSES_SHARE)
+        self._strangers = Allowance(_STRANGERS_SHARE)
         # With keep-outs the workspace has holes that it does not know; of a tool it knows nothing.
         known = workspace_is_exact(arm)
         self._workspace = Workspace(arm) if known else None
@@ -52,25 +72,57 @@ class Inbox:
         self._rate_hz = control.rate_hz
         self._stale_s = control.target_timeout_ms * 1e-3
 
+    def listen(self, session: zenoh.Session, arm_name: str) -> list[object]:
+        """Subscribe; command keys are plain subscriptions, never cached for late joiners."""
+
+        def subscribe(key: str, work: Callable[[zenoh.Sample], None]) -> object:
+            declare = partial(session.declare_subscriber, full_key(arm_name, key))
+            return serve(declare, last_resort(work, partial(self._refuse, key)), _WAITING)
+
+        subscribed = [
+            subscribe(TARGET.key, self.on_target),
+            subscribe(f"{TIP_POSE.key}/**", self.on_tip_pose),
+        ]
+        if self._source.name:  # others crowd nothing out of what waits under the one that counts
+            believed = f"{TIP_POSE.key}/{self._source.name}"
+            subscribed.append(subscribe(believed, self._on_believed_pose))
+        return subscribed
+
+    def _refuse(self, key: str, sample: zenoh.Sample, why: str) -> None:
+        self._notes.reject(key, why, payload=sample.payload.to_bytes())
+
     def on_target(self, sample: zenoh.Sample) -> None:
         """Take a target from who holds the lease."""
         received_ns = time.monotonic_ns()
         payload = sample.payload.to_bytes()
-        message = pb.Target()
+        holder = self._lease.is_proved_by(payload)
+        allowance = self._holders if holder else self._strangers
+        now_s, message = received_ns * 1e-9, pb.Target()
+        if allowance.left(now_s) <= 0.0:
+            self._notes.skip(TARGET.key)
+            return
+        begun_s = time.thread_time()
         try:
             message = decode(pb.Target, payload, str(sample.encoding))
-            target = self._checker.target(message)
-            with self._notes.lock:
-                self._check_fresh(message.state_sequence)
-                self._lease.check_target(
-                    message.client_id, message.lease_secret, message.sequence, received_ns * 1e-9
-                )
-                self._check_active()
-            told = self._towards_nearest(target, message.client_id, received_ns)
-            self._stream.send(SetTarget(told, message.sequence, received_ns))
+            self._take_target(message, received_ns)
         except MessageRejected as error:
-            self._notes.reject(TARGET.key, str(error), message.client_id, payload, message.sequence)
-            return
+            who, number = message.client_id, message.sequence
+            self._notes.reject(TARGET.key, str(error), who, payload, number, holder=holder)
+        finally:
+            allowance.spend(time.thread_time() - begun_s, now_s)
+
+    def _take_target(self, message: pb.Target, received_ns: int) -> None:
+        """Check who sends it, then what it is; raises TargetRejected before anything changes."""
+        claim = (message.client_id, message.lease_secret, message.sequence)
+        with self._notes.lock:
+            self._lease.check_target(*claim)
+        self._check_fresh(message.state_sequence)
+        self._check_active()
+        target = self._checker.target(message)
+        with self._notes.lock:  # it may have changed hands meanwhile
+            self._lease.take_target(*claim, received_ns * 1e-9)
+        told = self._towards_nearest(target, message.client_id, received_ns)
+        self._stream.send(SetTarget(told, message.sequence, received_ns))
         message.lease_secret = ""  # the log is no place for it
         self._notes.log(TARGET, message, received_ns)
 
@@ -131,15 +183,54 @@ class Inbox:
             )
 
     def on_tip_pose(self, sample: zenoh.Sample) -> None:
-        """Take a tip pose that motion capture has measured."""
+        """Take a tip pose that motion capture has measured, where no source is configured."""
+        source = source_of(str(sample.key_expr))
+        if not self._source.name:
+            self._take_pose(sample, source, self._poses)
+        elif source != self._source.name:
+            self._take_pose(sample, source, self._strangers)
+
+    def _on_believed_pose(self, sample: zenoh.Sample) -> None:
+        self._take_pose(sample, self._source.name, self._poses)
+
+    def _take_pose(self, sample: zenoh.Sample, source: str, allowance: Allowance) -> None:
         received_ns = time.monotonic_ns()
-        payload = sample.payload.to_bytes()
-        try:
-            message = decode(PoseInFrame, payload, str(sample.encoding))
-            self._publisher_of_poses.check(sample, message, received_ns * 1e-9)
-            position, quaternion = self._checker.tip_pose(message)
-        except MessageRejected as error:
-            self._notes.reject(TIP_POSE.key, str(error), "", payload)
+        now_s = received_ns * 1e-9
+        if allowance.left(now_s) <= 0.0:
+            self._notes.skip(TIP_POSE.key)
             return
+        payload, begun_s = sample.payload.to_bytes(), time.thread_time()
+        try:
+            self._check_pose(sample, payload, source, received_ns)
+        except MessageRejected as error:
+            self._notes.reject(TIP_POSE.key, str(error), source, payload)
+        finally:
+            allowance.spend(time.thread_time() - begun_s, now_s)
+
+    def _check_pose(
+        self, sample: zenoh.Sample, payload: bytes, source: str, received_ns: int
+    ) -> None:
+        """Take a pose; raises TargetRejected for who sends it, or for what it is."""
+        now_s = received_ns * 1e-9
+        attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        source = source or _session_of(sample)
+        self._source.check_publisher(source, payload, attachment, now_s)
+        message = decode(PoseInFrame, payload, str(sample.encoding))
+        position, quaternion = self._checker.tip_pose(message)
+        self._source.take(source, message, now_s)
         self._stream.send(SetTipPose(position, quaternion, received_ns))
         self._notes.log(TIP_POSE, message, received_ns)
+        if self._source.is_open and not self._told_open:
+            self._told_open = True
+            self._notes.tell(
+                "tip_pose_open",
+                "the measured tip comes from whoever publishes it: anyone on this wire can move an "
+                "active arm by it; name the publisher with feedback.tip_pose_source",
+                source,
+            )
+
+
+def _session_of(sample: zenoh.Sample) -> str:
+    """Return who publishes under the key without a name, where that is told: few publishers do."""
+    info = sample.source_info
+    return "" if info is None else f"{info.source_id.zid}/{info.source_id.eid}"

@@ -4,6 +4,25 @@ import secrets
 from dataclasses import dataclass
 
 from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected, TargetRejected
+from pneuarm.logs.schema.printable import printable
+
+#: No key can hold these: a client's name is a part of its liveliness token's.
+_NOT_IN_A_NAME = frozenset("/*$?#")
+_LONGEST_NAME = 64
+
+
+def check_name(client: str) -> None:
+    """Raise MessageRejected for a client_id that cannot be told to people, or not be in a key."""
+    if not 1 <= len(client) <= _LONGEST_NAME:
+        raise MessageRejected(
+            f"client_id has {len(client)} characters; it names who holds the arm, by 1 to "
+            f"{_LONGEST_NAME} characters"
+        )
+    if not client.isprintable() or not _NOT_IN_A_NAME.isdisjoint(client):
+        raise MessageRejected(
+            f"client_id = '{printable(client)}': printable characters without "
+            f"{' '.join(sorted(_NOT_IN_A_NAME))} are allowed"
+        )
 
 
 @dataclass
@@ -33,6 +52,11 @@ class Lease:
             return payload
         return payload.replace(held.secret.encode(), b"*" * len(held.secret))
 
+    def is_proved_by(self, payload: bytes) -> bool:
+        """Whether a message holds the holder's secret: the cheapest check there is."""
+        held = self._holder
+        return held is not None and held.secret.encode() in payload
+
     def has_operator(self, now_s: float) -> bool:
         """Whether somebody holds the lease and was heard within its timeout."""
         held = self._holder
@@ -44,10 +68,7 @@ class Lease:
         The holder asks again with its secret and keeps it. A holder that has not been heard for
         the timeout has lost it. Raises LeaseRefused with the holder's name.
         """
-        if not client or len(client) > 64:
-            raise MessageRejected(
-                "client_id must have 1 to 64 characters, to name who holds the arm"
-            )
+        check_name(client)
         held = self._holder
         if held is not None and held.client == client and held.secret == secret:
             held.heard_s = now_s
@@ -59,26 +80,32 @@ class Lease:
         self._holder = _Holder(client, secrets.token_hex(8), now_s)
         return self._holder.secret, held is not None
 
-    def check_target(self, client: str, secret: str, sequence: int, now_s: float) -> None:
-        """Take a target's claim to the lease; raises TargetRejected."""
+    def check_target(self, client: str, secret: str, sequence: int) -> None:
+        """Raise TargetRejected for a target that is not the holder's, or not its newest."""
         held = self._holder
         if held is None:
             raise TargetRejected("nobody holds the lease; enable the arm first")
         if held.client != client or held.secret != secret:
-            raise TargetRejected(f"{client or 'this client'} has no lease; {held.client} has it")
+            raise TargetRejected(
+                f"{printable(client, 64) or 'this client'} has no lease; {held.client} has it"
+            )
         if sequence <= held.sequence:
             raise TargetRejected(
                 f"sequence {sequence} is not above {held.sequence}, the last one; "
                 "a repeated or overtaken message"
             )
-        held.sequence = sequence
-        held.heard_s = now_s
+
+    def take_target(self, client: str, secret: str, sequence: int, now_s: float) -> None:
+        """Count a target that has passed all checks; raises TargetRejected as before."""
+        self.check_target(client, secret, sequence)
+        if self._holder is not None:
+            self._holder.sequence, self._holder.heard_s = sequence, now_s
 
     def release(self, client: str, secret: str) -> None:
         """Give the lease back; raises LeaseRefused if it is not this client's."""
         held = self._holder
         if held is None or held.client != client or held.secret != secret:
-            raise LeaseRefused(f"{client or 'this client'} does not hold the lease")
+            raise LeaseRefused(f"{printable(client, 64) or 'this client'} does not hold the lease")
         self._holder = None
 
     def client_gone(self, client: str) -> bool:

@@ -13,10 +13,22 @@ from pneuarm.logs.rings.ring import RingReader
 from pneuarm.logs.rings.rings import MessageReader
 from pneuarm.logs.rings.tick import state_from_tick, tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
-from pneuarm.logs.schema.codec import encode, encoding_of, is_json
-from pneuarm.logs.schema.topics import EVENT, HEALTH, STATE, TF, TIP, TOPICS, Topic, full_key
+from pneuarm.logs.schema.codec import encoding_of
+from pneuarm.logs.schema.topics import (
+    EVENT,
+    EVENTS,
+    HEALTH,
+    STATE,
+    TF,
+    TIP,
+    TOPICS,
+    Topic,
+    full_key,
+)
 from pneuarm.service.processes.shared import Shared
 from pneuarm.service.processes.usage import ProcessUsage
+from pneuarm.service.wire.answers import answer
+from pneuarm.service.wire.event_history import EventHistory
 
 _HEALTH_S = 1.0
 #: What the newest message of also answers queries.
@@ -25,6 +37,9 @@ _LATEST = tuple(topic for topic in TOPICS if topic.newest)
 
 class Publisher:
     """Reads the rings and publishes; a subscriber that stalls is dropped, never waited for."""
+
+    #: Keys that are answered by :meth:`on_latest`.
+    queried = (*_LATEST, EVENTS)
 
     def __init__(self, shared: Shared, arm: Arm, session: zenoh.Session) -> None:
         self._shared, self._session, self._arm = shared, session, arm
@@ -39,26 +54,21 @@ class Publisher:
             )
             for topic in (*_LATEST, EVENT)
         }
-        self._latest: dict[str, Message] = {}
-        self._queryables = [
-            session.declare_queryable(full_key(arm.name, topic.key), self._on_latest)
-            for topic in _LATEST
-        ]
+        self._history = EventHistory()
+        self._latest: dict[str, Message] = {EVENTS.key: self._history.message()}
         self._since_health: list[bytes] = []
         self._health_at_s = 0.0
         self._usage = ProcessUsage(shared.processes)
         self.newest_sequence = 0
         self.newest_mode: pb.Mode = pb.IDLE
 
-    def _on_latest(self, query: zenoh.Query) -> None:
-        """Answer with the newest message of the key that was asked for, as JSON if wanted."""
-        key = str(query.key_expr).split("/", 2)[-1]
-        message = self._latest.get(key)
-        encoding = str(query.encoding) if query.payload is not None else ""
-        with query:
-            if message is not None:
-                answer = encoding if is_json(encoding) else encoding_of(message)
-                query.reply(query.key_expr, encode(message, answer), encoding=answer)
+    def on_latest(self, topic: Topic, query: zenoh.Query) -> None:
+        """Answer with the newest message of a key; without one, there is no answer."""
+        message = self._latest.get(topic.key)
+        if message is None:
+            query.drop()
+        else:
+            answer(query, full_key(self._arm.name, topic.key), message)
 
     def _publish(self, topic: Topic, message: Message) -> None:
         self._latest[topic.key] = message
@@ -75,7 +85,10 @@ class Publisher:
             self._since_health.extend(record for _, record in records)
         for topic, payload, _ in self._events.read():
             if topic is EVENT:
-                self._publish(EVENT, pb.Event.FromString(payload))
+                event = pb.Event.FromString(payload)
+                self._publish(EVENT, event)
+                self._history.add(event)
+                self._latest[EVENTS.key] = self._history.message()
         if now_s - self._health_at_s >= _HEALTH_S and self._since_health:
             health = self._health(now_s)
             health.rejected_messages, health.command_drops = rejected, command_drops

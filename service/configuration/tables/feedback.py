@@ -130,6 +130,23 @@ class FeedbackConfig(Table):
         ),
     ] = 0.65
 
+    tip_pose_source: Annotated[
+        str,
+        Field(
+            max_length=64,
+            pattern=r"^[A-Za-z0-9_.-]*$",
+            description="the one publisher whose tip poses are taken, under the key "
+            "`sensor/tip_pose/<tip_pose_source>`; empty: the first that publishes, with a warning",
+        ),
+    ] = ""
+    tip_pose_key_file: Annotated[
+        str,
+        Field(
+            description="file with a secret of 16 bytes or more; each pose must then have the "
+            "HMAC-SHA256 of its payload attached, and a stamp that increases; empty: no signature"
+        ),
+    ] = ""
+
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""
         return FeedbackSettings(

@@ -171,9 +171,9 @@ def test_a_message_of_another_type_is_refused_by_the_name_of_its_schema() -> Non
 
 def test_a_message_with_fields_that_are_none_of_ours_is_refused() -> None:
     stranger = filled(pb.Health).SerializeToString()
-    assert "does not have; wrong message type?" in refusal(stranger, PROTOBUF, pb.ModeRequest)
+    assert "does not have" in refusal(stranger, PROTOBUF, pb.ModeRequest)
     inner = b"\x52\x05\x62\x03abc"  # position: {field 12: "abc"}
-    assert "does not have; wrong message type?" in refusal(inner, PROTOBUF)
+    assert "does not have" in refusal(inner, PROTOBUF)
     assert "no field named" in refusal(b'{"position": {"position_mm": {}}}', JSON)
 
 

@@ -18,6 +18,7 @@ WIRE = {
     ("health", "out", "pneuarm.Health", 1.0, True, None),
     ("event", "out", "pneuarm.Event", None, True, None),
     ("info", "query", "pneuarm.Info", None, True, None),
+    ("events", "query", "pneuarm.Events", None, False, None),
 }
 
 

@@ -60,7 +60,8 @@ def held(watcher: Client) -> pb.Event:
     events: list[pb.Event] = []
 
     def found() -> bool:
-        events.extend(event for event in watcher.events() if event.mode == pb.HOLD)
+        told = (event for event in watcher.events() if event.source == "control")
+        events.extend(event for event in told if event.mode == pb.HOLD)
         return bool(events)
 
     wait_for(found, "the event that the arm holds")

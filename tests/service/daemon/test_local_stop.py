@@ -1,6 +1,8 @@
 """The lock on a device, and the stop past the network."""
 
+import contextlib
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -10,7 +12,7 @@ import pytest
 
 from pneuarm.controllers.arm.errors import ConfigurationError, DaemonUnreachable, NotConfirmed
 from pneuarm.service.daemon import local_stop
-from pneuarm.service.daemon.local_stop import lock, stop_locally
+from pneuarm.service.daemon.local_stop import Callers, lock, stop_locally
 
 NAME = f"test-lock-{os.getpid()}"
 
@@ -129,3 +131,42 @@ def test_a_stuck_supervisor_with_a_full_queue_neither() -> None:
         stop_locally(NAME)
     for other in (*others, held):
         other.close()
+
+
+def test_connections_that_say_nothing_delay_no_stop() -> None:
+    with lock("arm", NAME) as listener, contextlib.ExitStack() as silent:
+        callers = Callers(listener)
+        stopped = threading.Event()
+
+        def serve() -> None:
+            while not stopped.is_set():
+                readable, _, _ = select.select(callers.sockets(), [], [], 0.02)
+                for caller in callers.asking_to_stop(readable):
+                    caller.sendall(b"stopped\n")
+                    caller.close()
+
+        server = threading.Thread(target=serve)
+        server.start()
+        for _ in range(300):  # by the hundred: more than may be silent at a time
+            other = silent.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+            other.connect(f"\0pneuarm/arm/{NAME}")
+        try:
+            stop_locally(NAME)  # within the patience of the fixture above
+        finally:
+            stopped.set()
+            server.join(20)
+        assert len(callers.sockets()) <= 129
+
+
+@pytest.mark.parametrize("said", [b"", b"x", b"e", b"GET / HTTP/1.1\r\n\r\n", b"\x00" * 4000])
+def test_who_asks_for_something_else_is_sent_away(said: bytes) -> None:
+    with lock("arm", NAME) as listener:
+        callers = Callers(listener)
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as other:
+            other.connect(f"\0pneuarm/arm/{NAME}")
+            if said:
+                other.sendall(said)
+            else:
+                other.shutdown(socket.SHUT_WR)
+            assert callers.asking_to_stop([listener]) == []
+            assert callers.sockets() == [listener]

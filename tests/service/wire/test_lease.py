@@ -15,6 +15,12 @@ def held(by: str = "ann", now_s: float = 0.0) -> tuple[Lease, str]:
     return lease, secret
 
 
+def take(lease: Lease, client: str, secret: str, sequence: int, now_s: float) -> None:
+    """Check a target, and count it when it has passed all the other checks too."""
+    lease.check_target(client, secret, sequence)
+    lease.take_target(client, secret, sequence, now_s)
+
+
 def test_the_first_who_asks_gets_it_with_a_secret_nobody_guesses() -> None:
     lease = Lease(TIMEOUT_S)
     assert lease.holder == ""
@@ -45,7 +51,7 @@ def test_somebody_else_may_take_over_and_the_old_secret_is_worthless() -> None:
     assert (lease.holder, taken) == ("bob", True)
     assert secret != old
     with pytest.raises(TargetRejected, match="ann has no lease; bob has it"):
-        lease.check_target("ann", old, 1, 0.2)
+        take(lease, "ann", old, 1, 0.2)
     with pytest.raises(LeaseRefused):
         lease.release("ann", old)
 
@@ -60,7 +66,7 @@ def test_a_holder_that_is_silent_for_the_timeout_has_lost_it() -> None:
 
 def test_targets_and_asking_again_keep_it_alive() -> None:
     lease, secret = held()
-    lease.check_target("ann", secret, 1, 4.0)
+    take(lease, "ann", secret, 1, 4.0)
     with pytest.raises(LeaseRefused):
         lease.take("bob", "", False, 8.0)
     lease.take("ann", secret, False, 8.0)
@@ -71,46 +77,46 @@ def test_targets_and_asking_again_keep_it_alive() -> None:
 
 def test_a_refused_target_keeps_nothing_alive() -> None:
     lease, secret = held()
-    lease.check_target("ann", secret, 5, 0.0)
+    take(lease, "ann", secret, 5, 0.0)
     with pytest.raises(TargetRejected):
-        lease.check_target("ann", secret, 5, 4.0)
+        take(lease, "ann", secret, 5, 4.0)
     lease.take("bob", "", False, 5.1)
 
 
 @pytest.mark.parametrize("sequence", [7, 6, 0])
 def test_a_replayed_or_overtaken_target_is_refused(sequence: int) -> None:
     lease, secret = held()
-    lease.check_target("ann", secret, 7, 0.0)
+    take(lease, "ann", secret, 7, 0.0)
     with pytest.raises(TargetRejected, match=f"sequence {sequence} is not above 7, the last one"):
-        lease.check_target("ann", secret, sequence, 0.1)
-    lease.check_target("ann", secret, 8, 0.2)
-    lease.check_target("ann", secret, 2**63, 0.2)  # gaps are allowed
+        take(lease, "ann", secret, sequence, 0.1)
+    take(lease, "ann", secret, 8, 0.2)
+    take(lease, "ann", secret, 2**63, 0.2)  # gaps are allowed
 
 
 def test_the_first_sequence_number_is_above_zero() -> None:
     lease, secret = held()
     with pytest.raises(TargetRejected, match="sequence 0 is not above 0"):
-        lease.check_target("ann", secret, 0, 0.0)
+        take(lease, "ann", secret, 0, 0.0)
 
 
 def test_a_new_lease_counts_from_the_beginning() -> None:
     lease, secret = held()
-    lease.check_target("ann", secret, 100, 0.0)
+    take(lease, "ann", secret, 100, 0.0)
     lease.release("ann", secret)
     secret, _ = lease.take("ann", "", False, 1.0)
-    lease.check_target("ann", secret, 1, 1.0)
+    take(lease, "ann", secret, 1, 1.0)
 
 
 @pytest.mark.parametrize(("client", "secret"), [("ann", "wrong"), ("bob", None), ("", "")])
 def test_a_target_without_the_lease_is_refused(client: str, secret: str | None) -> None:
     lease, real = held()
     with pytest.raises(TargetRejected, match=r"(this client|ann|bob) has no lease; ann has it"):
-        lease.check_target(client, real if secret is None else secret, 1, 0.0)
+        take(lease, client, real if secret is None else secret, 1, 0.0)
 
 
 def test_a_target_where_nobody_holds_it_is_refused() -> None:
     with pytest.raises(TargetRejected, match="nobody holds the lease; enable the arm first"):
-        Lease(TIMEOUT_S).check_target("ann", "", 1, 0.0)
+        take(Lease(TIMEOUT_S), "ann", "", 1, 0.0)
 
 
 def test_giving_it_back_needs_the_secret() -> None:
@@ -132,14 +138,14 @@ def test_a_client_that_is_gone_loses_it_and_others_do_not() -> None:
     assert lease.holder == ""
     assert not lease.client_gone("ann")
     with pytest.raises(TargetRejected):
-        lease.check_target("ann", secret, 1, 0.0)
+        take(lease, "ann", secret, 1, 0.0)
 
 
 def test_there_is_an_operator_as_long_as_the_holder_is_heard() -> None:
     lease, secret = held(now_s=10.0)
     assert lease.has_operator(10.0 + TIMEOUT_S)
     assert not lease.has_operator(10.1 + TIMEOUT_S)
-    lease.check_target("ann", secret, 1, 20.0)
+    take(lease, "ann", secret, 1, 20.0)
     assert lease.has_operator(20.0 + TIMEOUT_S)
     lease.release("ann", secret)
     assert not lease.has_operator(20.0)
@@ -153,7 +159,35 @@ def test_the_secret_is_in_no_event() -> None:
     assert Lease(TIMEOUT_S).redacted(b"other") == b"other"
 
 
-@pytest.mark.parametrize("client", ["", "x" * 65])
-def test_a_holder_has_a_name_to_be_told(client: str) -> None:
-    with pytest.raises(MessageRejected, match="client_id must have 1 to 64"):
+def test_a_target_that_is_only_checked_counts_for_nothing() -> None:
+    lease, secret = held()
+    lease.check_target("ann", secret, 7)
+    lease.check_target("ann", secret, 7)
+    lease.take("bob", "", False, TIMEOUT_S + 0.1)  # nor does it keep the lease
+
+
+@pytest.mark.parametrize(
+    "client",
+    ["", "x" * 65, "\x1b[2J", "a\nb", "a\rb", "\x00", "\x7f", "a/b", "a*", "$", "?", "#",
+     "\u202e", "\u2028", "\u200b", "\ufeff", "\ud800", "a\tb", "\x9b31m"],
+)  # fmt: skip
+def test_a_holder_has_a_name_that_can_be_told(client: str) -> None:
+    with pytest.raises(MessageRejected) as caught:
         Lease(TIMEOUT_S).take(client, "", False, 0.0)
+    assert "client_id" in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("client", ["ann", "x" * 64, "Jürgen's arm", "a@b-1f", "日本"])
+def test_any_printable_name_may_hold_it(client: str) -> None:
+    lease = Lease(TIMEOUT_S)
+    lease.take(client, "", False, 0.0)
+    assert lease.holder == client
+
+
+def test_only_the_secret_proves_the_holder() -> None:
+    lease, secret = held()
+    assert lease.is_proved_by(b"\x0a\x03ann\x12\x10" + secret.encode() + b"rest")
+    for other in (b"", b"ann", secret.encode()[:-1], b"\x00" * 60_000):
+        assert not lease.is_proved_by(other)
+    assert not Lease(TIMEOUT_S).is_proved_by(b"")

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
+from pneuarm.controllers.arm.errors import TargetRejected
 from pneuarm.controllers.targets.targets import TrajectoryTarget
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.target_messages import circle_target, line_target, trajectory_target
 from pneuarm.service.wire.target_checks import TargetChecker
-from pneuarm.service.wire.tip_pose_source import PosePublisher
 from tools.rig.arms import paper_arm
 
 CHECKER = TargetChecker(paper_arm())
@@ -79,17 +78,3 @@ def test_a_velocity_of_a_position_is_checked() -> None:
     message.position.velocity_m_s.x = 0.04
     target = CHECKER.target(message)
     assert np.array_equal(target.velocity_m_s, [0.04, 0.0, 0.0])  # type: ignore[union-attr]
-
-
-def test_a_second_publisher_of_tip_poses_is_refused_until_the_first_is_silent() -> None:
-    publisher = PosePublisher()
-    publisher.check_source("a", 0, 1.0)
-    publisher.check_source("a", 5_000, 1.1)
-    for source in ("b", ""):
-        with pytest.raises(MessageRejected, match="a second publisher"):
-            publisher.check_source(source, 6_000, 1.2)
-    with pytest.raises(MessageRejected, match="not newer"):
-        publisher.check_source("a", 5_000, 1.3)
-    publisher.check_source("b", 1_000, 3.0)
-    with pytest.raises(MessageRejected, match="a second publisher"):
-        publisher.check_source("a", 7_000, 3.1)

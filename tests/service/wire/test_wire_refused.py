@@ -130,8 +130,8 @@ HEALTH = pb.Health(ticks=7, rate_hz=1000.0, lease_holder="x").SerializeToString(
 
 WRONG_PAYLOADS: dict[str, tuple[Callable[[Follower], bytes], str, str]] = {
     "truncated": (lambda follower: whole(follower)[:-3], PROTOBUF, "not the protobuf form"),
-    "10 MB": (lambda follower: bytes(10_000_000), PROTOBUF, "10000000 bytes; at most 65536"),
-    "10 MB of JSON": (lambda follower: b"[" * 10_000_000, JSON, "at most 65536"),
+    "a megabyte": (lambda follower: bytes(1_000_000), PROTOBUF, "1000000 bytes; at most 65536"),
+    "a megabyte of JSON": (lambda follower: b"[" * 1_000_000, JSON, "at most 65536"),
     "deep JSON": (lambda follower: b"[" * 60_000, JSON, "not the JSON form"),
     "other message": (
         lambda follower: HEALTH,
@@ -167,7 +167,7 @@ WRONG_PAYLOADS: dict[str, tuple[Callable[[Follower], bytes], str, str]] = {
         'no field named "positionn"',
     ),
     "bytes": (lambda follower: b"\xff\xfe\x00", JSON, "not the JSON form"),
-    "nothing": (lambda follower: b"", PROTOBUF, "holds no target"),
+    "nothing": (lambda follower: b"", PROTOBUF, "has no lease; wire has it"),
 }
 
 
@@ -191,10 +191,13 @@ WRONG_REQUESTS: dict[str, tuple[dict[str, Any], str]] = {
     "not allowed now": ({"client_id": "wire", "action": "RESET"}, "mode is active: reset"),
     "no action": ({"client_id": "wire"}, "missing or unknown; one of TAKE_LEASE, ENABLE"),
     "another's arm": ({"client_id": "other", "action": "ENABLE"}, "wire holds the arm"),
-    "nobody's": ({"action": "TAKE_LEASE"}, "client_id must have 1 to 64 characters"),
+    "nobody's": ({"action": "TAKE_LEASE"}, "client_id has 0 characters"),
     "another's release": ({"client_id": "other", "action": "RELEASE_LEASE"}, "does not hold"),
-    "long name": ({"client_id": "n" * 65, "action": "HOLD_NOW"}, "at most 64 are allowed"),
-    "longest name": ({"client_id": "n" * 65400, "action": "HOLD_NOW"}, "at most 64 are allowed"),
+    "long name": ({"client_id": "n" * 65, "action": "HOLD_NOW"}, "client_id has 65 characters"),
+    "longest name": (
+        {"client_id": "n" * 65400, "action": "HOLD_NOW"},
+        "client_id has 65400 characters",
+    ),
     "unknown action": ({"client_id": "wire", "action": 99}, "action"),
 }
 
