@@ -9,6 +9,7 @@ from pneuarm.hardware.tables.table import BAR, Positive, Table
 from pneuarm.service.monitors.fault import Fault, Policy
 from pneuarm.service.monitors.monitor import (
     MS,
+    Lasting,
     Monitor,
     Observation,
     Persistence,
@@ -24,11 +25,9 @@ class SetpointForeignKeys(Table):
         Positive, Field(description="how far the device's setpoint may be from ours")
     ] = 0.03
     lasting_ms: Annotated[
-        float,
+        Lasting,
         Field(
-            ge=0,
-            le=10000,
-            description="for how long: above the time that a setpoint takes to the device and back",
+            description="for how long: above the time that a setpoint takes to the device and back"
         ),
     ] = 500.0
 

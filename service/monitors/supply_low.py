@@ -7,7 +7,7 @@ from pydantic import Field
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.hardware.tables.table import BAR, Table
 from pneuarm.service.monitors.fault import Fault, Policy
-from pneuarm.service.monitors.monitor import MS, Monitor, Observation, Persistence, bar
+from pneuarm.service.monitors.monitor import MS, Lasting, Monitor, Observation, Persistence, bar
 
 
 class SupplyLowKeys(Table):
@@ -21,9 +21,7 @@ class SupplyLowKeys(Table):
             description="how far the supply must be above the highest `pressure_max_bar`",
         ),
     ] = 0.2
-    lasting_ms: Annotated[
-        float, Field(ge=0, le=10000, description="for how long it may be below")
-    ] = 500.0
+    lasting_ms: Annotated[Lasting, Field(description="for how long it may be below")] = 500.0
 
 
 class SupplyLow(Monitor):
