@@ -78,7 +78,10 @@ def values(calibration: Calibration) -> list[Value]:
 def _deviations(calibration: Calibration, index: int) -> dict[str, float]:
     """Standard deviation of every field of a section, SI."""
     before, sd = calibration.before, calibration.fit.sd[index]
-    here, there = values_of(before, index, 0.0 * sd), values_of(before, index, sd)
+    theta = calibration.fit.theta[index]
+    here, there = values_of(before, index, theta), values_of(before, index, theta + sd)
+    softer = values_of(before, index, theta + np.where(np.arange(len(sd)) == 3, sd, 0.0))
+    there["softening_m_per_pa2"] = softer["softening_m_per_pa2"]
     found = {name: float(there[name] - here[name]) for name in here}
     found["hysteresis_pa"] = float(sd[NAMES.index("hysteresis")]) * span_pa(before.sections[index])
     return found

@@ -142,12 +142,14 @@ def test_chambers_that_were_always_moved_together_are_named() -> None:
 
 def test_too_few_rests_are_counted() -> None:
     patterns = np.random.default_rng(0).uniform(-1.0, 1.0, (8, 3))
-    assert "7 places with its tip measured; 12 at least" in refused(moved_through(patterns))
+    sentence = refused(moved_through(patterns))
+    assert "8 places" in sentence
+    assert "12 at least" in sentence
 
 
 def test_an_arm_that_never_rests_is_refused() -> None:
     recording = quiet_recording("paper")
-    restless = recording.sent_pa + 300.0 * np.arange(len(recording.time_s))[:, None, None]
+    restless = recording.sent_pa + 1500.0 * np.arange(len(recording.time_s))[:, None, None]
     with pytest.raises(CalibrationError, match="never still"):
         find_rests(replace(recording, sent_pa=restless))
 
@@ -176,8 +178,8 @@ def start_of_shifted(nominal: Arm, arm: Arm) -> Array:
     """Parameters of ``arm`` around ``nominal``, whose scales they have."""
     theta = start_of(nominal)
     for index, (section, base) in enumerate(zip(arm.sections, nominal.sections, strict=True)):
-        theta[index, 0] = section.rest_length_m / base.rest_length_m - 1.0
-        theta[index, 2] = section.lengthening_m_per_pa / base.lengthening_m_per_pa - 1.0
+        theta[index, 0] = np.log(section.rest_length_m / base.rest_length_m)
+        theta[index, 2] = np.log(section.lengthening_m_per_pa / base.lengthening_m_per_pa)
     theta[:, 6:] = start_of(arm)[:, 6:]
     return theta
 

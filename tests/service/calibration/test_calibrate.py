@@ -97,6 +97,7 @@ def arguments(folder: Path, daemon: Daemon, **changed: Any) -> argparse.Namespac
         "out": folder,
         "from_logs": None,
         "world": False,
+        "resume": False,
     }
     return argparse.Namespace(**(given | changed))
 
