@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 from pneuarm.controllers.arm.arm import Arm
-from pneuarm.controllers.arm.errors import CalibrationError
+from pneuarm.controllers.arm.errors import CalibrationError, InvalidInput
 from pneuarm.controllers.calibration.excitation import require_determined, require_motion
 from pneuarm.controllers.calibration.fit import Fit, fit
 from pneuarm.controllers.calibration.recording import Recording, find_rests
 from pneuarm.controllers.calibration.response import ResponseFit, fit_response, fit_valves
-from pneuarm.controllers.calibration.worth import require_worth
+from pneuarm.controllers.calibration.worth import explained, require_worth
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,15 @@ def calibrate(arm: Arm, recording: Recording, in_world: bool = False) -> Calibra
     behind = replace(arm.response, delay_s=valves.delay_s, lag_s=valves.lag_s)
     rests = find_rests(recording, behind)
     require_motion(arm, recording, rests)
-    found = fit(replace(arm, response=behind), recording, rests, in_world)
-    require_worth(found, replace(arm, response=behind), recording, rests)
+    lagging = replace(arm, response=behind)
+    try:
+        found = fit(lagging, recording, rests, in_world)
+    except InvalidInput as error:
+        raise CalibrationError(
+            f"what fits the measured tips best is no arm: {error}; "
+            f"{explained(lagging, recording, rests, in_world)}"
+        ) from error
+    require_worth(found, lagging, recording, rests)
     require_determined(found)
     kept = replace(found.arm, response=arm.response)
     try:

@@ -10,13 +10,13 @@ where the rests are not met from there, some other magnitudes are tried as well.
 """
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pneuarm.controllers.arm.arm import Arm, Array
-from pneuarm.controllers.arm.errors import CalibrationError, InvalidInput
 from pneuarm.controllers.calibration.frames import Frames, aligned, in_base
 from pneuarm.controllers.calibration.hysteresis import play_outputs, turning_points
 from pneuarm.controllers.calibration.model import TipModel
@@ -45,13 +45,19 @@ SEEN_SHARE = 0.5
 
 #: So often the fit is tried again around a parameter that ended on its bound.
 _TRIES = 3
+#: Evaluations of one try: a good arm needs some ten.
+_EVALUATIONS = 100
 #: First what is large: with priors this much tighter.
 _TIGHT = 5.0
 #: Rests met within this share of the arm's length, on average, are met: no other start is tried.
 _MET_SHARE = 0.015
-#: Magnitudes of the lengthening, and shares of bend lost to the weight, from which it is tried.
-_LENGTHENINGS = (0.1, 0.3, 3.0, 10.0)
+#: Magnitudes of lengthening and offset, and shares of bend lost to the weight: of these places the
+#: nearest to the rests are the next starts, so many.
+_MAGNITUDES = (0.1, 0.3, 1.0, 3.0, 10.0)
 _COMPLIANCES = (0.0, 0.4)
+_STARTS = 3
+#: Far from any arm a derivative may be no number, or beyond any use.
+_LARGEST = 1e6
 
 #: The marker's z axis is that of the tip unless it is turned by more (rad) on average.
 _MARKER_TURNED = 0.15
@@ -207,7 +213,8 @@ class _Problem:
         seen = self.used & self.pointing
         wanted = self._measured[seen] @ frames.axis
         turned = (frames.directions(pose[seen]) - wanted) / self.direction_sd
-        return np.concatenate([errors.reshape(-1), turned.reshape(-1), (x - self.centre) / self.sd])
+        data = np.concatenate([errors.reshape(-1), turned.reshape(-1)])
+        return np.concatenate([_in_reach(data), (x - self.centre) / self.sd])
 
     def over_x(self, x: Array) -> Array:
         return np.concatenate([self.data_over_x(x), np.diag(1.0 / self.sd)])
@@ -229,12 +236,11 @@ class _Problem:
             positions.append(frames.over_frames(tips.pose[self.used]))
             directions.append(frames.directions_over_frames(tips.pose[seen]))
         width = len(x)
-        return np.concatenate(
-            [
-                np.concatenate(positions, axis=-1).reshape(-1, width) / MODEL_SD_M,
-                np.concatenate(directions, axis=-1).reshape(-1, width) / self.direction_sd,
-            ]
+        blocks = (
+            np.concatenate(positions, axis=-1).reshape(-1, width) / MODEL_SD_M,
+            np.concatenate(directions, axis=-1).reshape(-1, width) / self.direction_sd,
         )
+        return _in_reach(np.concatenate(blocks))
 
     def spread(self, per_x: Array, missing: float) -> Array:
         """Values over the free parameters as (n_sections, len(NAMES))."""
@@ -255,7 +261,7 @@ class _Problem:
             xtol=tolerance,
             ftol=tolerance,
             gtol=tolerance,
-            max_nfev=200,
+            max_nfev=_EVALUATIONS,
         )
         self.sd = sd
         solution: Array = found.x
@@ -283,24 +289,25 @@ class _Problem:
         return hit
 
     def starts(self) -> list[Array]:
-        """Other magnitudes of what scales the motion."""
-        found = []
-        for lengthening in _LENGTHENINGS:
-            for compliance in _COMPLIANCES:
-                theta = self.start.copy()
-                theta[:, 2] += np.log(lengthening)
-                theta[:, 4] = compliance
-                x = self.x.copy()
-                x[: self.n_parameters] = theta.reshape(-1)[self._free]
-                found.append(x)
-        return found
+        """Other magnitudes of what scales the motion, the nearest to the rests first."""
+        found: list[tuple[float, Array]] = []
+        for lengthening, offset, compliance in product(_MAGNITUDES, _MAGNITUDES, _COMPLIANCES):
+            theta = self.start.copy()
+            theta[:, 1] += np.log(offset)
+            theta[:, 2] += np.log(lengthening)
+            theta[:, 4] = compliance
+            x = self.x.copy()
+            x[: self.n_parameters] = theta.reshape(-1)[self._free]
+            self.place(x)
+            found.append((float(self.errors_m(x).mean()), x))
+        return [x for _, x in sorted(found, key=lambda each: each[0])[:_STARTS]]
 
 
 def fit(arm: Arm, recording: Recording, rests: Rests, in_world: bool = False) -> Fit:
     """Fit the map of ``arm`` to the rests of a recording.
 
     ``in_world`` fits the frames of the measurement too: a position that is not that of the tip in
-    the base, but of a marker in a frame of its own. Raises CalibrationError for a map that no arm
+    the base, but of a marker in a frame of its own. Raises InvalidInput for a map that no arm
     can have.
     """
     problem = _Problem(arm, recording, rests, in_world)
@@ -309,6 +316,12 @@ def fit(arm: Arm, recording: Recording, rests: Rests, in_world: bool = False) ->
     problem.point(x)
     x = problem.solved(x)
     return _fit_at(problem, before, x)
+
+
+def _in_reach(values: Array) -> Array:
+    """Values with what is beyond any use cut off."""
+    cut: Array = np.clip(np.nan_to_num(values), -_LARGEST, _LARGEST)
+    return cut
 
 
 def nearest(arm: Arm, recording: Recording, rests: Rests, in_world: bool) -> tuple[float, Frames]:
@@ -341,12 +354,8 @@ def _fit_at(problem: _Problem, before: Array, x: Array) -> Fit:
     sd = np.sqrt(np.diag(posterior))
     theta, effective = problem.theta(x), problem.effective(x)[0]
     held_out_m, held_out_rad = _held_out(problem, x)
-    try:
-        arm = arm_of(problem.arm, theta)
-    except InvalidInput as error:
-        raise CalibrationError(f"what fits the measured tips best is no arm: {error}") from error
     return Fit(
-        arm=arm,
+        arm=arm_of(problem.arm, theta),
         frames=problem.frames_at(x),
         theta=theta,
         sd=problem.spread(sd, 0.0),

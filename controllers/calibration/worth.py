@@ -26,19 +26,32 @@ LARGEST_SHARE, LARGEST_OF_MOTION = 0.035, 0.2
 _BETTER = 0.6
 #: A coupling this strong is more often a valve in another place.
 _STRONG = 0.5
-#: A frame that is turned (rad) or away (m) by less is none of its own.
-_TURNED_RAD, _AWAY_M = 0.05, 0.02
+#: A fit this good (a share of the arm's length) is not doubted for its values.
+_GOOD_SHARE = 0.005
+#: A frame that is turned (rad) by less is none of its own; by more than the second it surely is.
+_TURNED_RAD, _SURELY_TURNED_RAD = 0.05, 0.35
+#: Explanations this near (m) to the best are told beside it.
+_BESIDE_M = 5e-4
 
 
 def require_worth(found: Fit, arm: Arm, recording: Recording, rests: Rests) -> None:
     """Raise CalibrationError for a fit that must not be used, with what was probably wrong."""
-    why = _why_not(found)
-    if not why and not _suspicious(found):
+    why, mean_m = _why_not(found), float(found.errors_m.mean())
+    if not why and not (_suspicious(found) and mean_m > _GOOD_SHARE * arm.total_rest_length_m):
         return
-    others = _explanations(found, arm, recording, rests)
+    # A body that is no arc is followed better from a base elsewhere: no reason to refuse it.
+    turned_rad = _TURNED_RAD if why else _SURELY_TURNED_RAD
+    others = _explanations(mean_m, arm, recording, rests, found.in_world, turned_rad)
     if why or others:
         worth = why or _worth_text(found, "and with values that hardly any arm has")
         raise CalibrationError(f"{worth}; {others or _NO_EXPLANATION}")
+
+
+def explained(arm: Arm, recording: Recording, rests: Rests, in_world: bool) -> str:
+    """What was probably told wrongly where no arm could be fitted at all."""
+    mean_m = arm.total_rest_length_m
+    others = _explanations(mean_m, arm, recording, rests, in_world, _TURNED_RAD)
+    return others or _NO_EXPLANATION
 
 
 _NO_EXPLANATION = (
@@ -98,38 +111,45 @@ def _suspicious(found: Fit) -> bool:
     return weightless or bool(np.any(np.abs(theta[:, 6:13]) > _STRONG))
 
 
-def _explanations(found: Fit, arm: Arm, recording: Recording, rests: Rests) -> str:
-    """What would explain the motion far better, in words, joined by "or"."""
-    mean_m = float(found.errors_m.mean())
+def _explanations(
+    mean_m: float,
+    arm: Arm,
+    recording: Recording,
+    rests: Rests,
+    in_world: bool,
+    turned_rad: float,
+) -> str:
+    """What would explain the motion far better than ``mean_m``, in words, joined by "or"."""
+    others = _alternatives(arm, recording, rests, in_world, turned_rad)
     most = min(_BETTER * mean_m, LARGEST_SHARE * arm.total_rest_length_m)
-    told = [
-        (error, text) for error, text in _alternatives(found, arm, recording, rests) if error < most
-    ]
+    told = [(error, text) for error, text in others if error < most]
     least = min((error for error, _ in told), default=0.0)
     return ", or ".join(
-        f"it would be {1e3 * error:.1f} mm {text}" for error, text in told if error <= 1.3 * least
+        f"it would be {1e3 * error:.1f} mm {text}"
+        for error, text in told
+        if error <= least + _BESIDE_M
     )
 
 
 def _alternatives(
-    found: Fit, arm: Arm, recording: Recording, rests: Rests
+    arm: Arm, recording: Recording, rests: Rests, in_world: bool, turned_rad: float
 ) -> Iterator[tuple[float, str]]:
     """Mean error (m) if something else were so, and what."""
     for order in list(permutations(range(3)))[1:]:
         moved = replace(recording, sent_pa=recording.sent_pa[..., order])
-        yield nearest(arm, moved, rests, found.in_world)[0], _order_text(order)
+        yield nearest(arm, moved, rests, in_world)[0], _order_text(order)
     for gravity in _other_gravities(arm):
         other = replace(arm, gravity_m_s2=gravity)
         yield (
-            nearest(other, recording, rests, found.in_world)[0],
+            nearest(other, recording, rests, in_world)[0],
             f"with arm.gravity_m_s2 = {[round(each, 2) for each in gravity]}: look which way the "
             "arm is mounted",
         )
-    if not found.in_world:
+    if not in_world:
         error, frames = nearest(arm, recording, rests, True)
         turn = rotation_vector(frames.rotation)
         angle, away = float(np.linalg.norm(turn)), float(np.linalg.norm(frames.translation_m))
-        if angle > _TURNED_RAD or away > _AWAY_M:
+        if angle > turned_rad:
             yield (
                 error,
                 f"if the frame of the tip poses were turned by {np.rad2deg(angle):.0f} degrees "

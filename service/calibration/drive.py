@@ -196,7 +196,8 @@ def _require_going_on(client: Client, state: pb.ArmState) -> None:
     if state.mode != pb.ACTIVE:
         mode = pb.Mode.Name(state.mode).lower()
         raise ModeRefused(
-            f"the arm went to mode {mode} in the middle of the calibration{_cause(client)}"
+            f"the arm went to mode {mode} in the middle of the calibration"
+            f"{_cause(client, state.mode)}"
         )
     if not _measured(state):
         raise CalibrationError(
@@ -205,13 +206,14 @@ def _require_going_on(client: Client, state: pb.ArmState) -> None:
         )
 
 
-def _cause(client: Client) -> str:
+def _cause(client: Client, mode: "pb.Mode") -> str:
     """What the daemon said of the change of mode: fault, cause and remedy."""
     time.sleep(0.1)  # an event may come after the state that shows its effect
     told = client.events()
     if not told:
         return ""
-    event = max(told, key=lambda event: event.level)  # the first of the gravest
+    # The first of the gravest among those of that mode: what changed it.
+    event = max(told, key=lambda event: (event.mode == mode, event.level))
     said = "; ".join(part for part in (event.text, event.cause, event.remedy) if part)
     return f" ({event.code}: {said})"
 
