@@ -34,11 +34,15 @@ from pneuarm.controllers.calibration.recording import AVERAGED_S, Recording, Res
 
 #: What a measured rest may differ from the best model (m): creep, swing, a body that is no arc.
 MODEL_SD_M = 1.5e-3
-#: The same for the direction of the tip (rad), at least: it counts as much as the model follows it.
-DIRECTION_SD = 0.02
+#: The same for the direction of the tip (rad), at least and at most: in between it counts as much
+#: as the model follows it.
+DIRECTION_SD, LARGEST_DIRECTION_SD = 0.02, 0.06
 
 #: Prior of the frames: turn (rad) and places (m) are free, the marker (m) sits near the tip.
 _FRAMES_SD = np.array([1.0] * 3 + [1.0] * 3 + [0.03] * 3)
+
+#: Priors of rest length and axial compliance beside them.
+_LENGTHS_IN_WORLD_SD = (0.05, 0.2)
 
 #: A parameter whose standard deviation the data reduce to below this share of the prior is seen.
 SEEN_SHARE = 0.5
@@ -126,7 +130,7 @@ class _Problem:
         self.highest = np.tile(HIGHEST, arm.n_sections)[self._free]
         self.x = self.start.reshape(-1)[self._free]
         if in_world:
-            self.sd = np.append(self.sd, _FRAMES_SD)
+            self.sd = np.append(np.minimum(self.sd, _in_world_sd(arm, self._free)), _FRAMES_SD)
             self.lowest = np.append(self.lowest, np.full(9, -np.inf))
             self.highest = np.append(self.highest, np.full(9, np.inf))
             self.x = np.append(self.x, np.zeros(9))
@@ -171,7 +175,8 @@ class _Problem:
         if self.in_world or turned > _MARKER_TURNED:
             self.frames = replace(self.frames, axis=axis)
         angles = self.angles_rad(x)[self.pointing]
-        self.direction_sd = max(DIRECTION_SD, float(np.sqrt(np.mean(angles**2))))
+        left = float(np.sqrt(np.mean(angles**2)))
+        self.direction_sd = min(max(DIRECTION_SD, left), LARGEST_DIRECTION_SD)
 
     def axes(self, x: Array) -> Array:
         """Directions (rests, 3) of the model's tips in the frame of the measured marker."""
@@ -316,6 +321,14 @@ def fit(arm: Arm, recording: Recording, rests: Rests, in_world: bool = False) ->
     problem.point(x)
     x = problem.solved(x)
     return _fit_at(problem, before, x)
+
+
+def _in_world_sd(arm: Arm, free: NDArray[np.bool_]) -> Array:
+    """Priors where the frames are fitted: a base that may be anywhere takes a length's part."""
+    sd = PRIOR_SD.copy()
+    sd[[NAMES.index("rest_length"), NAMES.index("axial_compliance")]] = _LENGTHS_IN_WORLD_SD
+    tiled: Array = np.tile(sd, arm.n_sections)[free]
+    return tiled
 
 
 def _in_reach(values: Array) -> Array:

@@ -7,6 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
 from pneuarm.controllers.calibration.plan import duration_s, plan
 from pneuarm.controllers.calibration.recording import Recording
@@ -15,7 +17,15 @@ from pneuarm.service.calibration.drive import Progressed, ask, progress, record,
 from pneuarm.service.calibration.files import calibrated, require_folder, toml_text, write_whole
 from pneuarm.service.calibration.page import page
 from pneuarm.service.calibration.recordings import read_logs, require_seen
-from pneuarm.service.calibration.values import errors_mm, residuals_text, value_text, values
+from pneuarm.service.calibration.values import (
+    direction_deg,
+    errors_mm,
+    held_out_mm,
+    residuals_text,
+    value_text,
+    values,
+    worth_text,
+)
 from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import Configuration, check
 
@@ -85,7 +95,7 @@ def _tell(arguments: argparse.Namespace, found: Calibration, folder: Path) -> No
     if arguments.json:
         print(json.dumps(report(found, folder)))
         return
-    print(f"{residuals_text(found)}.")
+    print(f"{residuals_text(found)}.\n{worth_text(found)}.")
     for value in values(found):
         print(f"  {value_text(value)}")
     if found.note:
@@ -102,6 +112,15 @@ def report(found: Calibration, folder: Path) -> dict[str, Any]:
         "rests": len(after),
         "error_before_mm": {"mean": before.mean(), "max": before.max()},
         "error_after_mm": {"mean": after.mean(), "max": after.max()},
+        "held_out_mm": {
+            "mean": float(np.nanmean(held_out_mm(found))),
+            "max": float(np.nanmax(held_out_mm(found))),
+        },
+        "direction_deg": {
+            "before": direction_deg(found.fit.direction_before_rad),
+            "after": direction_deg(found.fit.direction_rad),
+            "held_out": direction_deg(found.fit.held_out_rad),
+        },
         "parameters": [vars(value) for value in values(found)],
         "coupling": [section.coupling for section in found.arm.sections],
         "rotation_base_to_measuring": frames.rotation.tolist(),

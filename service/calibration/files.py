@@ -12,7 +12,7 @@ from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.frames import Frames
 from pneuarm.controllers.geometry.frames import Transform, rotation_vector
-from pneuarm.service.calibration.values import residuals_text, value_text, values
+from pneuarm.service.calibration.values import residuals_text, value_text, values, worth_text
 from pneuarm.service.configuration.configuration import Configuration, check
 from pneuarm.service.configuration.tables.frames import FramesConfig
 from pneuarm.service.configuration.tables.table import BAR, DEG, MM
@@ -93,6 +93,8 @@ def toml_text(configuration: Configuration, calibration: Calibration) -> str:
     when = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     lines = [
         f"Calibration of arm {configuration.arm.name}, {when}: {residuals_text(calibration)}.",
+        f"Worth: {worth_text(calibration)}.",
+        *([f"Note: {calibration.note}."] if calibration.note else []),
         "Run it with `pneuarm run calibration.toml`. Fitted, with standard deviations:",
         *(f"  {value_text(value)}" for value in values(calibration)),
     ]

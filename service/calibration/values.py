@@ -103,6 +103,38 @@ def errors_mm(calibration: Calibration) -> tuple[Array, Array]:
     return before, after
 
 
+def held_out_mm(calibration: Calibration) -> Array:
+    """Errors (rests,) of fits that did not see the rest they are judged at, mm."""
+    return calibration.fit.held_out_m / MM
+
+
+def direction_deg(angles_rad: Array) -> float | None:
+    """Median (degrees) of angles between directions, None where no direction was measured."""
+    seen = angles_rad[np.isfinite(angles_rad)]
+    return float(np.rad2deg(np.median(seen))) if len(seen) else None
+
+
+def worth_text(calibration: Calibration) -> str:
+    """Say in one sentence what the fit is worth at places that it did not see."""
+    held_out = held_out_mm(calibration)
+    percent = 100.0 * np.nanmean(held_out) * MM / calibration.arm.total_rest_length_m
+    sentence = (
+        f"at rests that no fit had seen the tip is {np.nanmean(held_out):.2f} mm off on average "
+        f"({percent:.2f} % of the arm's length), at most {np.nanmax(held_out):.1f} mm"
+    )
+    direction = direction_deg(calibration.fit.held_out_rad)
+    if direction is None:
+        return f"{sentence}; its direction was not measured"
+    turned = float(np.rad2deg(np.arccos(np.clip(calibration.fit.frames.axis[2], -1.0, 1.0))))
+    sentence += f", and points {direction:.1f} degrees elsewhere in the median"
+    if turned > 1.0:
+        sentence += (
+            f" when the marker is taken to sit turned by {turned:.0f} degrees on the tip (see "
+            "tip_in_marker_rotation_deg)"
+        )
+    return sentence
+
+
 def residuals_text(calibration: Calibration) -> str:
     """Say in one sentence how far the modelled tip is from the measured one."""
     before, after = errors_mm(calibration)
