@@ -192,18 +192,30 @@ def _refused(found: ValvesFit, why: str) -> ValvesFit:
 
 
 def _lags(sent: Array, measured: Array, delay_s: float) -> tuple[float, float]:
-    """Lags (s) of filling and of exhausting: of the pressure's rate against what is missing."""
+    """Lags (s) of filling and of exhausting: of the pressure's rate against what is missing.
+
+    Filling is a rise, or, where there is vacuum, what leads away from ambient: the two of which
+    the lags differ more.
+    """
     late = lagged(sent, delay_s, 0.0)
     width = max(1, round(0.03 / STEP_S))
     rate = (measured[2 * width :] - measured[: -2 * width]) / (2 * width * STEP_S)
     missing = (late - measured)[width:-width]
     large = np.abs(missing) > 0.1 * np.abs(missing).max(initial=1.0)
-    lags = []
-    for way in (missing > 0.0, missing < 0.0):
-        taken = large & way
-        rates, gaps = rate[taken], missing[taken]
-        lags.append(float(np.sum(gaps**2) / max(float(np.sum(gaps * rates)), 1e-9)))
-    return lags[0], lags[1]
+    away = missing * np.sign(late[width:-width]) > 0.0
+    pairs = [
+        (
+            _lag(rate[large & way], missing[large & way]),
+            _lag(rate[large & ~way], missing[large & ~way]),
+        )
+        for way in (missing > 0.0, away)
+    ]
+    return max(pairs, key=lambda lags: max(lags) / max(min(lags), 1e-4))
+
+
+def _lag(rates: Array, missing: Array) -> float:
+    """Lag (s) under which what is missing goes away at these rates."""
+    return float(np.sum(missing**2) / max(float(np.sum(missing * rates)), 1e-9))
 
 
 def _why_no_valves(found: ValvesFit, left: float, lags: tuple[float, float]) -> str:

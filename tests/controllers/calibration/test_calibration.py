@@ -16,7 +16,13 @@ from pneuarm.controllers.calibration.hysteresis import play_outputs
 from pneuarm.controllers.calibration.model import TipModel
 from pneuarm.controllers.calibration.parameters import NAMES, SHAPING, arm_of, start_of
 from pneuarm.controllers.calibration.plan import Move, duration_s, plan
-from pneuarm.controllers.calibration.recording import Recording, Rests, find_rests, fresh_tips
+from pneuarm.controllers.calibration.recording import (
+    Recording,
+    Rests,
+    find_rests,
+    fresh_tips,
+    settled,
+)
 from pneuarm.controllers.calibration.response import fit_response
 from pneuarm.service.configuration.configuration import load
 from tests.controllers.calibration.synthetic import (
@@ -267,3 +273,70 @@ def test_the_derivative_over_the_frames_is_that_of_the_position() -> None:
         change[0, index] = 1e-6
         slope = (frames.measured_m(pose + change) - frames.measured_m(pose - change))[0] / 2e-6
         np.testing.assert_allclose(frames.over_pose()[:, index], slope, atol=1e-8)
+
+
+def test_rests_are_found_behind_a_dither_and_a_lead() -> None:
+    recording = quiet_recording("paper")
+    rests = find_rests(recording)
+    swing = 1500.0 * np.sign(np.sin(2.0 * np.pi * 33.0 * recording.time_s))[:, None, None]
+    found = find_rests(replace(recording, sent_pa=recording.sent_pa + swing))
+    assert len(found.last) > 0.8 * len(rests.last)
+
+
+def test_slow_motion_gives_places_too_and_neighbours_are_in_one_stretch() -> None:
+    time_s = np.arange(0.0, 20.0, 0.01)
+    sent = 4e4 * np.sin(2.0 * np.pi * time_s / 40.0)[:, None, None] * np.ones((1, 1, 3))
+    tips = np.stack([1e-6 * sent[:, 0, 0]] * 3, axis=1)
+    found = find_rests(Recording(time_s, sent, sent, tips))
+    assert len(found.last) >= 8
+    assert found.stretch is not None
+    assert len(set(found.stretch.tolist())) == 1
+    # The mean tip is that of the middle of its time, where the pressure is read.
+    middle = np.interp(time_s[found.last] - 0.2, time_s, tips[:, 0])
+    np.testing.assert_allclose(found.tip_m[:, 0], middle, atol=5e-4)
+
+
+def test_a_place_whose_pressures_still_move_is_none() -> None:
+    recording = quiet_recording("paper")
+    leaking = recording.measured_pa - 3e4 * (recording.time_s % 1.5)[:, None, None]
+    with pytest.raises(CalibrationError, match="settled"):
+        find_rests(replace(recording, measured_pa=leaking))
+
+
+def test_an_arm_has_settled_when_pressures_and_tip_stand() -> None:
+    time_s = np.arange(0.0, 1.0, 0.01)
+    still, tips = np.zeros((100, 1, 3)), np.zeros((100, 3))
+    assert settled(time_s, still, tips)
+    assert settled(time_s, np.full_like(still, np.nan), tips)
+    assert not settled(time_s, still + 3e3 * time_s[:, None, None], tips)
+    assert not settled(time_s, still, tips + 5e-3 * time_s[:, None])
+    assert not settled(time_s[:30], still[:30], tips[:30])
+
+
+def test_valves_that_fill_and_exhaust_at_other_paces_are_not_taken_for_one_lag() -> None:
+    truth = TRUTH["paper"]
+    steps = [move for move in plan(PAPER) if move.ramp_s == 0.0]
+    recording = recording_of(truth, sent_by(steps, 1))
+    measured = np.zeros_like(recording.sent_pa)
+    for index in range(1, len(measured)):
+        missing = recording.sent_pa[index] - measured[index - 1]
+        filling = np.abs(recording.sent_pa[index]) > np.abs(measured[index - 1])
+        measured[index] = measured[index - 1] + missing * 0.01 / np.where(filling, 0.15, 0.45)
+    found = fit_response(
+        truth, replace(recording, measured_pa=measured), calibration("paper").fit.frames
+    )
+    assert any(text.startswith("valve response not identified") for text in found.not_identified)
+    assert found.response.lag_s == truth.response.lag_s
+    assert found.response.delay_s == truth.response.delay_s
+
+
+def test_a_mode_that_is_not_seen_is_left_out_by_name() -> None:
+    truth = TRUTH["paper"]
+    steps = [move for move in plan(PAPER) if move.ramp_s == 0.0]
+    recording = recording_of(truth, sent_by(steps, 1))
+    rng = np.random.default_rng(0)
+    shaken = recording.tip_m + np.cumsum(rng.normal(0.0, 1e-3, recording.tip_m.shape), axis=0)
+    found = fit_response(truth, replace(recording, tip_m=shaken), calibration("paper").fit.frames)
+    assert any(text.startswith("mode not identified") for text in found.not_identified)
+    assert found.response.mode_hz == truth.response.mode_hz
+    assert found.response.lag_s == pytest.approx(truth.response.lag_s, rel=0.1)
