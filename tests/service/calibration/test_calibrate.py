@@ -118,6 +118,7 @@ def test_an_arm_is_calibrated_and_the_daemon_takes_the_result(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(commands_calibrate, "plan", few_moves)
+    monkeypatch.setattr(commands_calibrate, "ask", lambda why: True)  # a busy machine stalls
     with Camera(daemon):
         time.sleep(0.3)
         assert commands_calibrate.run(arguments(tmp_path / "live", daemon)) == 0
@@ -205,7 +206,7 @@ def test_a_stall_holds_names_its_cause_and_goes_on_by_the_word(
     def stall(elapsed_s: float, whole_s: float) -> None:
         if elapsed_s > 1.6 and not stalled:
             stalled.append(elapsed_s)
-            time.sleep(0.5)
+            time.sleep(5.5)  # beyond the target timeout of this daemon
 
     def word(why: str) -> bool:
         asked.append(why)
@@ -216,7 +217,7 @@ def test_a_stall_holds_names_its_cause_and_goes_on_by_the_word(
         time.sleep(0.3)
         drive.record(client, moves, 1, stall, word, so_far)
         configuration = check(tomllib.loads(client.info().config_toml))
-    assert any("target_stale" in why for why in asked)
+    assert any("target_stale" in why for why in asked), asked
     assert so_far.moves_done == len(moves)
     assert len(so_far.pieces) >= 2
     # What was kept goes on where it was, and only with the same arm.
