@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup demo faults test test-slow check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults test test-slow test-lowest check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -15,7 +15,8 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pneuarm needs Python 3.11 or newer; name one: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+	    --editable distributions/client --editable .
 	@touch $(READY)
 
 demo: setup
@@ -33,17 +34,20 @@ test: check
 test-slow: setup
 	$(BIN)/pytest -m slow
 
-# Style, types, import contracts, and generated code that still matches its .proto.
+# Style, types, import contracts; what the client's distribution holds also as Python 3.10 sees it.
+CLIENT := pneuarm/__init__.py pneuarm/__main__.py \
+    $(addprefix pneuarm/, controllers/arm/errors.py logs/schema service/client service/network)
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --python-version 3.10 $(CLIENT)
 	$(BIN)/lint-imports
 
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
 # The finite elements are recorded; `python -m tools.validation.finite_elements` solves them anew.
 validate: bench-setup
-	$(BIN)/python -m pneuarm.service.validation.report --out docs
+	$(BIN)/python -m tools.validation.report --out docs
 
 # Every benchmark, one after another, on a machine that does nothing else; writes its table.
 bench: bench-setup
@@ -53,15 +57,33 @@ bench: bench-setup
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 
-proto: setup
-	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. pneuarm/logs/schema/pneuarm.proto
+# The tables of docs/ that stand in the code: keys, messages, faults, modes.
+docs: setup
+	$(BIN)/python -m tools.docs
+
+# Message classes run with their protoc's protobuf or a newer one: 5.29 is what the oldest
+# environments have that the client shall share, and what foxglove-schemas-protobuf was made with.
+# This protoc wants a protobuf older than the daemon's, so it stands in an environment of its own.
+proto:
+	$(PYTHON) -m venv .venv-proto
+	.venv-proto/bin/pip install --quiet --disable-pip-version-check grpcio-tools==1.71.2
+	.venv-proto/bin/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. \
+	    pneuarm/logs/schema/pneuarm.proto
 
 # Needs uv; only for whoever changes the dependencies.
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
-    --no-emit-index-url --no-annotate --no-header --group dev
+    --no-emit-index-url --no-annotate --no-header --extra pictures --group dev --no-emit-package pneuarm-client
 lock:
 	$(LOCK) --output-file requirements.lock
 	$(LOCK) --group bench --constraint requirements.lock --output-file requirements-bench.lock
 
+# The oldest versions that pyproject.toml allows, as uv finds them, pass the tests too.
+LOWEST := .venv-lowest
+test-lowest:
+	uv venv --quiet --clear --seed --python $(PYTHON) $(LOWEST)
+	uv pip install --quiet --python $(LOWEST) --resolution lowest-direct \
+	    --requirements pyproject.toml --extra pictures --group dev --editable .
+	$(LOWEST)/bin/pytest -n 2 --dist loadgroup -m "not slow"
+
 clean:
-	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) .venv-* build *.egg-info distributions/client/*.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -10,6 +10,11 @@ from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
 from pneuarm.hardware.checked import checked_command
 
 
+def valves_or_all(valves: tuple[int, ...], n_chambers: int) -> tuple[int, ...]:
+    """Return the valve or channel of every chamber: 0, 1, 2, ... where none is named."""
+    return valves or tuple(range(n_chambers))
+
+
 @dataclass(frozen=True)
 class Channels:
     """Which of ``count`` channels, counted from 0, feeds each chamber, section by section.

@@ -36,9 +36,6 @@ class Hardware(Protocol):
     not answer as it must.
     """
 
-    #: True where the device itself zeroes its outputs when its host falls silent.
-    has_watchdog: bool
-
     def connect(self) -> None:
         """Open the device and set every output to zero."""
         ...

@@ -1,1 +1,1 @@
-"""What is written down and shown: messages, ring, recorder, reader, replay and view."""
+"""What is written down and shown: messages, rings, recorder, reader, view. No Zenoh."""

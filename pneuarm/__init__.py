@@ -15,23 +15,44 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pneuarm.controllers.arm.errors import (
+        AlreadyInUse,
+        CalibrationError,
+        ConfigurationError,
         DaemonUnreachable,
+        HardwareError,
+        InvalidInput,
         LeaseRefused,
+        LogError,
+        MessageRejected,
         ModeRefused,
+        MoveTimeout,
         NotConfirmed,
+        NotInstalled,
         PneuarmError,
         TargetRejected,
     )
     from pneuarm.service.client.client import Client
 
+__version__ = "0.1.0"
+
 __all__ = [
+    "AlreadyInUse",
+    "CalibrationError",
     "Client",
+    "ConfigurationError",
     "DaemonUnreachable",
+    "HardwareError",
+    "InvalidInput",
     "LeaseRefused",
+    "LogError",
+    "MessageRejected",
     "ModeRefused",
+    "MoveTimeout",
     "NotConfirmed",
+    "NotInstalled",
     "PneuarmError",
     "TargetRejected",
+    "__version__",
 ]
 
 

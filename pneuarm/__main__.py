@@ -4,6 +4,8 @@ import os
 import signal
 from types import FrameType
 
+from pneuarm import __version__
+
 
 def _on_ctrl_c(number: int, frame: FrameType | None) -> None:
     """End without a word while a command still loads; nothing has begun yet."""
@@ -24,8 +26,15 @@ def main() -> None:
     """Run the command line."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under `nohup`
         signal.signal(signal.SIGINT, _on_ctrl_c)
-    from pneuarm.service.cli.parser import main as command
-
+    try:
+        from pneuarm.service.cli.parser import main as command
+    except ModuleNotFoundError as error:
+        if error.name != "pneuarm.service.cli":  # what the distribution of the client leaves out
+            raise
+        raise SystemExit(
+            "pneuarm: only the client is installed here, `from pneuarm import Client`; the daemon "
+            f"and the commands come with `pip install pneuarm=={__version__}`"
+        ) from None
     raise SystemExit(command())
 
 

@@ -1,1 +1,1 @@
-"""The daemon: configuration, mode machine, loop, gateway, supervisor, client and commands."""
+"""The daemon and its commands, room by room. Clocks, processes, sockets and Zenoh live here."""

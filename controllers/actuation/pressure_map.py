@@ -15,45 +15,18 @@ chamber gets softer as it fills, as table 1 of the paper shows.
 """
 
 from itertools import product
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from pneuarm.controllers.actuation.symbols import is_plain, symbolic_lengthening, symbolic_unloaded
 from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 
 #: A Newton step below this (m) is the last, which leaves an error of some 1e-13 m; one that needs
 #: more steps than this does not converge.
 _CONVERGED_M = 1e-7
 _NEWTON_STEPS = 12
-
-
-class Compiled:
-    """A CasADi function of arrays of one shape, through its buffer interface.
-
-    ``outputs`` are overwritten by the next call.
-    """
-
-    def __init__(self, name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> None:
-        dense = ca.cse([ca.densify(output) for output in outputs])
-        self.function = ca.Function(name, inputs, dense)
-        buffer: Any  # CasADi's stubs do not know its own default arguments
-        buffer, self._evaluate = self.function.buffer()
-        self._buffer = buffer
-        self.inputs = [np.zeros(symbol.numel()) for symbol in inputs]
-        self.outputs = [np.zeros(output.numel()) for output in dense]
-        for index, values in enumerate(self.inputs):
-            buffer.set_arg(index, values.data)
-        for index, values in enumerate(self.outputs):
-            buffer.set_res(index, values.data)
-
-    def __call__(self, *values: Array) -> list[Array]:
-        """Evaluate at arrays of as many elements as the symbols, in C order."""
-        for own, given in zip(self.inputs, values, strict=True):
-            own[:] = given.reshape(-1)
-        self._evaluate()
-        return self.outputs
 
 
 def symbolic_pressures(arm: Arm, lengths: ca.SX) -> ca.SX:
@@ -88,10 +61,12 @@ class PressureMap:
         goal = ca.SX.sym("goal", arm.n_chambers)
         residual = symbolic_unloaded(arm, lengths) - goal
         step = ca.solve(ca.jacobian(residual, lengths), residual)
-        self._pressures = Compiled("pressures", [lengths], [symbolic_pressures(arm, lengths)])
+        self._pressures = CompiledFunction(
+            "pressures", [lengths], [symbolic_pressures(arm, lengths)]
+        )
         unloaded = symbolic_lengthening(arm, pressures) + arm.rest_lengths_m.reshape(-1)
-        self._unloaded = Compiled("unloaded", [pressures], [unloaded])
-        self._newton = Compiled("newton", [lengths, goal], [step])
+        self._unloaded = CompiledFunction("unloaded", [pressures], [unloaded])
+        self._newton = CompiledFunction("newton", [lengths, goal], [step])
 
     def lengths_m(self, pressures_pa: Array, near_m: Array | None = None) -> Array:
         """Lengths of the hanging chambers at the given gauge pressures.
@@ -129,7 +104,7 @@ class PressureMap:
             return 2.0 * lengthening / (self._linear + root)
         if lengths_m.shape == self._shape:
             return self._pressures(lengths_m)[0].reshape(self._shape).copy()
-        columns = np.asarray(self._pressures.function(lengths_m.reshape(-1, self._rest_m.size).T))
+        columns = self._pressures.columns(lengths_m.reshape(-1, self._rest_m.size).T)
         return columns.T.reshape(lengths_m.shape)
 
 

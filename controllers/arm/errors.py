@@ -3,14 +3,18 @@
 PneuarmError
 |-- InvalidInput            an argument of a function: name, value, what is allowed
 |-- ConfigurationError      a key of the configuration
+|   `-- AlreadyInUse        an arm or a device that another daemon has
 |-- HardwareError           a device: connection, answer, diagnosis
 |-- LogError                a session log
 |-- CalibrationError        a motion, or a log, that does not show what a calibration needs
-|-- TargetRejected          a target that the daemon does not take
+|-- NotInstalled            a package, or a part of pneuarm, that a command needs
+|-- MessageRejected         a message that cannot be read, or that this key does not take
+|   `-- TargetRejected      a target that was read, and that the daemon does not take
 |-- ModeRefused             a mode change that is not allowed now
 |   `-- LeaseRefused        another client holds the arm
+|-- MoveTimeout             a target that was taken, and not reached in time
+|-- NotConfirmed            a stop that was sent, and whose effect was not seen
 `-- DaemonUnreachable       nobody answers under that address
-    `-- NotConfirmed        a command was sent and its effect was not seen
 """
 
 
@@ -26,6 +30,14 @@ class ConfigurationError(PneuarmError):
     """A configuration was refused before any device was touched."""
 
 
+class AlreadyInUse(ConfigurationError):
+    """Another daemon has it: process ``process_id``, or None where the kernel does not tell."""
+
+    def __init__(self, text: str, process_id: int | None = None) -> None:
+        super().__init__(text)
+        self.process_id = process_id
+
+
 class HardwareError(PneuarmError):
     """A device cannot be reached or answers what its protocol does not allow."""
 
@@ -38,7 +50,15 @@ class CalibrationError(PneuarmError):
     """What was moved or recorded does not determine the map; the text says what is missing."""
 
 
-class TargetRejected(PneuarmError):
+class NotInstalled(PneuarmError):
+    """What a command needs is not installed; the text names what to install."""
+
+
+class MessageRejected(PneuarmError):
+    """A message was refused; nothing changed because of it."""
+
+
+class TargetRejected(MessageRejected):
     """A target was refused; nothing moved because of it."""
 
 
@@ -50,9 +70,13 @@ class LeaseRefused(ModeRefused):
     """Another client holds the lease; the text names it."""
 
 
+class MoveTimeout(PneuarmError):
+    """A target was not reached in time; the arm holds when it is no longer refreshed."""
+
+
+class NotConfirmed(PneuarmError):
+    """A stop was sent and nothing showed that it acted: cut the air supply."""
+
+
 class DaemonUnreachable(PneuarmError):
     """No daemon answered under the address."""
-
-
-class NotConfirmed(DaemonUnreachable):
-    """A stop was sent and no state showed that it acted."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Frames:
         """Frames after a small turn (3,), translation (3,) and marker (3,)."""
         return replace(
             self,
-            rotation=rotation_of(change[:3]) @ self.rotation,
+            rotation=rotation_from_vector(change[:3]) @ self.rotation,
             translation_m=self.translation_m + change[3:6],
             marker_m=self.marker_m + change[6:],
         )
@@ -76,17 +77,6 @@ class Frames:
 def in_base() -> Frames:
     """Frames of a measurement of the tip itself in the base."""
     return Frames(np.eye(3), np.zeros(3), np.zeros(3))
-
-
-def rotation_of(vector_rad: Array) -> Array:
-    """Rotation (3, 3) by a vector (3,), rad: Rodrigues' formula."""
-    angle = float(np.linalg.norm(vector_rad))
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = vector_rad / angle
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned: Array = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
-    return turned
 
 
 def aligned(tips_m: Array, measured_m: Array) -> Frames:

@@ -17,7 +17,7 @@ from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.fit import Fit, nearest
 from pneuarm.controllers.calibration.parameters import HIGHEST, NAMES
 from pneuarm.controllers.calibration.recording import Recording, Rests
-from pneuarm.controllers.geometry.frames import rotation_vector
+from pneuarm.controllers.geometry.rotations import rotation_vector
 
 #: The mean error at places that were not seen may be this share of the arm's length, and this
 #: share of how far the tip moved (the root of its mean square).

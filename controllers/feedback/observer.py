@@ -15,8 +15,11 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.feedback.prediction import Prediction
-from pneuarm.controllers.geometry.frames import rotation_from_vector, rotation_vector
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_vector,
+    rotation_vector,
+)
 
 #: Time constant (s) by which the estimate follows the measured difference, and its scatter.
 _FAST_S, _SCATTER_S = 0.02, 0.5

@@ -1,6 +1,9 @@
-"""A CasADi function called through its buffer interface, on arrays that stay where they are."""
+"""CasADi functions of arrays, called through CasADi's buffer interface: the only place that does.
 
-from collections.abc import Sequence
+CasADi stores by columns, numpy by rows: what is transposed here lies in its buffer in C order.
+"""
+
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
@@ -10,32 +13,43 @@ from pneuarm.controllers.arm.arm import Array
 
 
 class CompiledFunction:
-    """Calls cost half a microsecond, and allocate nothing.
+    """A call costs half a microsecond, and allocates nothing.
 
-    ``results`` are arrays of the given shapes, in C order; a sparse result is the vector of its
-    non-zeros, column by column. Every call overwrites them.
+    ``arguments`` are flat arrays (numel,) which a call reads, ``results`` arrays of the given
+    shapes, in C order, which every call overwrites; a column is a flat array too. ``evaluate()``
+    reads the arguments where they stand; it does not keep this object alive.
     """
 
     def __init__(self, name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -> None:
-        # CasADi is column-major: a transposed matrix lies in its buffer in C order.
-        in_c_order = [r if r.nnz() < r.numel() else ca.densify(r.T) for r in results]
-        self._function = ca.Function(name, arguments, ca.cse(in_c_order))
-        buffer: Any  # CasADi's stubs do not know its own default arguments
-        buffer, self.call = self._function.buffer()
-        self._buffer = buffer
-        self.results = [_array(result) for result in results]
+        self._function = ca.Function(
+            name, arguments, ca.cse([ca.densify(result.T) for result in results])
+        )
+        self._buffer: Any  # CasADi's stubs do not know its own default arguments
+        self.evaluate: Callable[[], None]
+        self._buffer, self.evaluate = self._function.buffer()
+        self.results = [np.zeros(_shape(result)) for result in results]
         for index, array in enumerate(self.results):
-            buffer.set_res(index, array.data)
-        self._kept: list[Array] = []
+            self._buffer.set_res(index, array.data)
+        self.bind([np.zeros(argument.numel()) for argument in arguments])
 
     def bind(self, arguments: Sequence[Array]) -> None:
-        """Read the arguments from these arrays from now on."""
-        self._kept = list(arguments)
+        """Read the arguments from these arrays, of any shape in C order, from now on."""
+        self.arguments = list(arguments)
         for index, array in enumerate(arguments):
             self._buffer.set_arg(index, array.data)
 
+    def __call__(self, *values: Array) -> list[Array]:
+        """Evaluate at copies of the values, arrays of as many elements; return ``results``."""
+        for own, given in zip(self.arguments, values, strict=True):
+            own[...] = given.reshape(own.shape)
+        self.evaluate()
+        return self.results
 
-def _array(result: ca.SX) -> Array:
-    if result.nnz() < result.numel():
-        return np.zeros(result.nnz())
-    return np.zeros(result.shape[0] if result.shape[1] == 1 else result.shape)
+    def columns(self, *values: Array) -> Array:
+        """Evaluate for every column of arguments (numel, batch); the one result, (numel, batch)."""
+        return np.asarray(self._function(*values))
+
+
+def _shape(result: ca.SX) -> tuple[int, ...]:
+    rows, columns = result.shape
+    return (rows,) if columns == 1 else (rows, columns)

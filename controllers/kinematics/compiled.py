@@ -11,6 +11,7 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.kinematics.smooth import Smooth, from_quarter, series
 
 #: Terms of the series of the quarter angle: 1e-10 at theta = 20 rad, full precision below 4 pi.
@@ -120,18 +121,10 @@ class CompiledKinematics:
         lengths = ca.SX.sym("lengths", arm.n_chambers)
         position, rotation, jacobian = symbolic_tip(arm, lengths)
         transform = ca.vertcat(ca.horzcat(rotation, position), ca.DM([[0.0, 0.0, 0.0, 1.0]]))
-        # CasADi is column-major: a transposed matrix lies in its buffer in C order.
-        transposed = ca.cse([ca.densify(matrix.T) for matrix in (transform, jacobian)])
-        self._function = ca.Function("tip", [lengths], transposed)
-        buffer: Any  # CasADi's stubs do not know its own default arguments
-        buffer, self._evaluate = self._function.buffer()
-        self._buffer = buffer
+        self._function = CompiledFunction("tip", [lengths], [transform, jacobian])
         self._shape = (arm.n_sections, 3)
-        self._lengths = np.zeros(self._shape)
-        self._transform, self._jacobian = np.zeros((4, 4)), np.zeros((6, arm.n_chambers))
-        self._buffer.set_arg(0, self._lengths.data)
-        self._buffer.set_res(0, self._transform.data)
-        self._buffer.set_res(1, self._jacobian.data)
+        self._lengths = self._function.arguments[0].reshape(self._shape)
+        self._transform, self._jacobian = self._function.results
         self._state = TipState(self._transform[:3, 3], self._transform[:3, :3], self._jacobian)
 
     def evaluate(self, lengths_m: Array) -> TipState:
@@ -143,7 +136,7 @@ class CompiledKinematics:
         if lengths_m.shape != self._shape:
             self._refuse(lengths_m)
         self._lengths[...] = lengths_m
-        self._evaluate()
+        self._function.evaluate()
         return self._state
 
     def fresh(self, lengths_m: Array) -> tuple[Array, Array]:
@@ -154,7 +147,7 @@ class CompiledKinematics:
         if lengths_m.shape != self._shape:
             self._refuse(lengths_m)
         self._lengths[...] = lengths_m
-        self._evaluate()
+        self._function.evaluate()
         return self._transform.copy(), self._jacobian.copy()
 
     def _refuse(self, lengths_m: Array) -> None:

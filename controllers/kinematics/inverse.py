@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.geometry.rotations import rotation_vectors
 from pneuarm.controllers.kinematics import checks
 from pneuarm.controllers.kinematics.constant_curvature import (
     lengths_from_shapes,
@@ -96,29 +97,6 @@ def pose_error(arm: Arm, lengths_m: Array, poses: Array, frame: Frame = "twist_f
         tips = in_frame(tips, last, frame)
     turn = rotation_vectors(poses[..., :3, :3] @ np.swapaxes(tips[..., :3, :3], -1, -2))
     return np.concatenate([poses[..., :3, 3] - tips[..., :3, 3], turn], axis=-1)
-
-
-def rotation_vectors(rotations: Array) -> Array:
-    """Axis times angle ``(..., 3)`` of rotations ``(..., 3, 3)``, the angle from 0 to pi."""
-    skew = 0.5 * (rotations - np.swapaxes(rotations, -1, -2))
-    axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-    sine = np.linalg.norm(axis, axis=-1, keepdims=True)
-    cosine = 0.5 * (np.trace(rotations, axis1=-2, axis2=-1)[..., None] - 1.0)
-    angle = np.arctan2(sine, cosine)
-    scale = np.where(sine > 1e-9, angle / np.where(sine > 1e-9, sine, 1.0), 1.0)
-    half_turn = (sine <= 1e-6) & (cosine < 0.0)
-    return np.where(half_turn, angle * _half_turn_axes(rotations), scale * axis)
-
-
-def _half_turn_axes(rotations: Array) -> Array:
-    """Axes ``(..., 3)`` of rotations by pi: the largest column of ``R + 1``, normalised."""
-    columns = np.swapaxes(rotations + np.eye(3), -1, -2)
-    norms = np.linalg.norm(columns, axis=-1)
-    largest = np.take_along_axis(columns, norms.argmax(axis=-1)[..., None, None], axis=-2)[
-        ..., 0, :
-    ]
-    axes: Array = largest / np.maximum(norms.max(axis=-1), 1e-300)[..., None]
-    return axes
 
 
 def _one_section(arm: Arm, poses: Array, frame: Frame) -> Array:

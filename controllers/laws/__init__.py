@@ -1,1 +1,1 @@
-"""One step of the commanded chambers: the problem, the two laws, the safe step, the controller."""
+"""One step of the commanded chambers: the problem, the two laws, the safe step."""

@@ -21,14 +21,12 @@ from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.laws.solve_ik import IkProblem
 from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.targets.targets import PARTS, ROWS
 from pneuarm.controllers.tasks.rows import Parts, symbolic_rows
 from pneuarm.controllers.tasks.wanted import symbols
 
 #: What rounding may take from a slack, m.
 _ROUNDING_M = 1e-14
-
-#: Of the slew limit, that a step to first order may use; the exact check follows.
-_SLEW_SHARE = 0.998
 
 #: Share of the acceleration that braking plans with.
 _BRAKING_SHARE = 0.8
@@ -38,23 +36,25 @@ _TINY = 1e-12
 
 
 class SafeStep:
-    """The compiled step. Arguments are arrays of the caller's, see :class:`solve_ik.IkBuilder`."""
+    """The compiled step. Arguments are arrays of the caller's, see :class:`solve_ik.IkBuilder`.
 
-    def __init__(self, arm: Arm, limits: Limits, whole: bool) -> None:
+    ``task_rows`` is the number of rows of the problem's Jacobian.
+    """
+
+    def __init__(self, arm: Arm, limits: Limits, whole: bool, task_rows: int) -> None:
         self._arm, self._limits = arm, limits
         self._rate_max = ca.DM(arm.per_chamber("length_rate_max_m_s").reshape(-1))
         self._acceleration = ca.DM(arm.per_chamber("length_acceleration_max_m_s2").reshape(-1))
         n = arm.n_chambers
         lengths, rates, wish = (ca.SX.sym(name, n) for name in ("lengths", "rates", "wish"))
-        vector, want = symbols(n)
+        vector, want = symbols(n, PARTS)
         dt, share = ca.SX.sym("dt"), ca.SX.sym("share")
-        task_rows = 9 if whole else 3
         jacobian, checks = ca.SX.sym("jacobian", n, task_rows), ca.SX.sym("checks", 3)
         slowed = self._slowed(lengths, wish, dt, want, jacobian.T, checks[2])
         after = self._rates(rates, slowed, dt, share)
         moved = lengths + dt * after
         slack = self._slack(lengths, moved, after, dt, share)
-        rows = symbolic_rows(arm, moved, want, whole)
+        rows = symbolic_rows(arm, moved, want, ROWS, whole)
         self.function = CompiledFunction(
             "safe_step",
             [lengths, rates, vector, dt, wish, share, jacobian, checks],
@@ -101,7 +101,7 @@ class SafeStep:
         most = ca.vertcat(
             1.0,
             ca.norm_inf(wish),
-            self._limits.pressure.slew_share(lengths, wanted) / _SLEW_SHARE,
+            *(limit.rate_share(lengths, wanted) for limit in self._limits),
             tip_speed / (want["speed_max_m_s"] + _TINY),
             gain / braked,
         )
@@ -140,17 +140,13 @@ class SafeStep:
         """
         stop = moved + rates * (0.5 * self._stopping_time(rates))
         places = [moved, 0.5 * (moved + stop), stop]
-        rooms = [
-            ca.fmax(0.0, ca.fmin(0.5 * limit.margin_m, limit.slack(before)))
-            for limit in self._limits.others
-        ]
-        slacks = [limit.slack(stop) for limit in self._limits.convex]
-        slacks += [
-            limit.slack(place) - (share > 0.0) * room
-            for limit, room in zip(self._limits.others, rooms, strict=True)
-            for place in places
-        ]
-        slacks.append(self._limits.pressure.slew_slack(before, moved, dt))
+        slacks = [limit.step_slack(before, moved, dt) for limit in self._limits]
+        for limit in self._limits:
+            if limit.convex:
+                slacks.append(limit.slack(stop))
+                continue
+            room = ca.fmax(0.0, ca.fmin(0.5 * limit.margin_m, limit.slack(before)))
+            slacks += [limit.slack(place) - (share > 0.0) * room for place in places]
         every = ca.vertcat(*slacks)
         return ca.mmin(every) + 0.0 * ca.sum1(every)  # the minimum itself would drop a NaN
 
@@ -169,7 +165,7 @@ class SafeStep:
 
     def _allowed(self, share: float, floor: float) -> bool:
         self._share[0] = share
-        self.function.call()
+        self.function.evaluate()
         return bool(self._scalars[0] >= floor)  # never true of a NaN
 
     def _floor(self) -> float:

@@ -1,4 +1,4 @@
-"""One step of differential inverse kinematics as a QP: build_ik makes it, IkSolver solves it.
+"""One step of differential inverse kinematics as a QP: IkBuilder makes it, IkSolver solves it.
 
     minimise    |J dq - rate dt|^2 + damping |dq - base|^2
     subject to  lower <= G dq <= upper        (what the limits leave, linearised)
@@ -20,9 +20,11 @@ import numpy as np
 import osqp
 import scipy.sparse as sparse
 
+from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.targets.targets import PARTS, ROWS
 from pneuarm.controllers.tasks.rows import Parts, symbolic_rows
 from pneuarm.controllers.tasks.wanted import symbols
 
@@ -103,7 +105,7 @@ class IkProblem:
 
 
 class IkBuilder:
-    """build_ik, compiled: the whole problem in one call.
+    """The compiled function that makes the whole problem in one call.
 
     The arguments are arrays that the caller owns and changes in place: ``lengths_m`` and
     ``rates_m_s`` (n_chambers,), the vector of what is wanted, and ``dt_s`` (1,).
@@ -114,7 +116,7 @@ class IkBuilder:
         self._rate_max = ca.DM(arm.per_chamber("length_rate_max_m_s").reshape(-1))
         self._acceleration = ca.DM(arm.per_chamber("length_acceleration_max_m_s2").reshape(-1))
         lengths, rates = (ca.SX.sym(name, arm.n_chambers) for name in ("lengths", "rates"))
-        vector, want = symbols(arm.n_chambers)
+        vector, want = symbols(arm.n_chambers, PARTS)
         dt = ca.SX.sym("dt")
         jacobian, rate, base, damping, by_feedback = self._cost(lengths, dt, want, whole)
         cost = jacobian.T @ jacobian + damping * ca.SX.eye(arm.n_chambers)
@@ -154,7 +156,7 @@ class IkBuilder:
         """Jacobian (m, n), rate (m,), base (n,), damping, and the share that is feedback."""
         largest = ca.mmax(self._rate_max)
         step, scale = self._rate_max * dt, largest * dt
-        rows = symbolic_rows(self._arm, lengths, want, whole)
+        rows = symbolic_rows(self._arm, lengths, want, ROWS, whole)
         jacobian = rows.jacobian @ ca.diag(self._rate_max / largest)
         damping = ca.fmax(want["lengths_weight"], DAMPING)
         chambers = want["lengths_weight"] / damping * (want["lengths_m"] - lengths) / step
@@ -172,7 +174,7 @@ class IkBuilder:
 
     def _posture(self, lengths: ca.SX, jacobian: ca.SX, weight: ca.SX) -> ca.SX:
         """Toward the middle of the bounds, as far as it moves no task."""
-        low, high = self._limits.length.lower_m, self._limits.length.upper_m
+        low, high = length_bounds_m(self._arm)
         middle, half = (0.5 * values.reshape(-1) for values in (high + low, high - low))
         back = weight * _POSTURE_SHARE * (ca.DM(middle) - lengths) / ca.DM(half)
         gram = jacobian @ jacobian.T + _NULL_DAMPING * ca.SX.eye(jacobian.shape[0])
@@ -185,46 +187,48 @@ class IkBuilder:
 
         So a straight way to any target inside the bounds is never turned aside.
         """
-        n, step = self._arm.n_chambers, self._rate_max * dt
-
-        def allowed(slack: ca.SX, margin: float) -> ca.SX:
-            return ca.fmin(gain * dt, 1.0) * (slack - margin)
-
-        def sides(bound: ca.SX) -> tuple[ca.SX, ca.SX]:
-            return -bound[:n], bound[n:]
-
-        length, pressure = self._limits.length, self._limits.pressure
-        lower, upper = sides(allowed(length.slack(lengths), length.margin_m))
-        matrix, extra_lower, extra_upper = ca.SX.eye(n), [], []
-        # A vented chamber has none of its margin. It is small, and taken back at once: without it
-        # the arm could but creep along this curved bound.
-        slack = pressure.slack(lengths)
-        lacking = ca.fmax(slack - pressure.margin_m, -pressure.margin_m)
-        below, above = sides(ca.fmin(lacking, allowed(slack, pressure.margin_m)))
-        above = ca.fmax(above, below)
-        slope = ca.jacobian(pressure.slack(lengths)[:n], lengths)
-        if pressure.is_diagonal():
-            own = ca.diag(slope)
-            lower, upper = ca.fmax(lower, below / own), ca.fmin(upper, above / own)
-            upper = ca.fmax(upper, lower)
-        else:
-            matrix = ca.vertcat(matrix, slope @ ca.diag(step) / step)
-            extra_lower, extra_upper = [below / step], [above / step]
+        step, share = self._rate_max * dt, ca.fmin(gain * dt, 1.0)
+        smallest = ca.mmin(step)
+        chambers: list[tuple[ca.SX, ca.SX]] = []
+        rows: list[tuple[ca.SX, ca.SX, ca.SX]] = []
         # Where the arm could stop: along a curved bound the way there counts, not the place.
         stop = lengths + rates * (0.5 * ca.mmax(ca.fabs(rates) / self._acceleration))
-        smallest = ca.mmin(step)
-        for limit in self._limits.curved:
-            slack = ca.substitute(limit.slack(lengths), lengths, stop)
-            gradient = ca.substitute(ca.jacobian(limit.slack(lengths), lengths), lengths, stop)
-            matrix = ca.vertcat(matrix, -gradient @ ca.diag(step) / smallest)
-            bound = allowed(slack, limit.margin_m) / smallest
-            extra_lower.append(ca.SX.ones(bound.shape) * -_INFINITY)
-            extra_upper.append(bound)
-        return (
-            matrix,
-            ca.vertcat(lower / step, *extra_lower),
-            ca.vertcat(upper / step, *extra_upper),
-        )
+        for limit in self._limits:
+            slack = limit.slack(lengths)
+            slope = ca.jacobian(slack, lengths)
+            if limit.two_sided:
+                n = slack.numel() // 2
+                bound = limit.approach(slack, share)
+                below, above = -bound[:n], ca.fmax(bound[n:], -bound[:n])
+                if _is_diagonal(slope[:n, :]):
+                    own = ca.diag(slope[:n, :])
+                    chambers.append((below / own, above / own))
+                else:
+                    rows.append((slope[:n, :] @ ca.diag(step) / step, below / step, above / step))
+            else:
+                slack, slope = (ca.substitute(part, lengths, stop) for part in (slack, slope))
+                bound = limit.approach(slack, share) / smallest
+                none = ca.SX.ones(bound.shape) * -_INFINITY
+                rows.append((-slope @ ca.diag(step) / smallest, none, bound))
+        lower, upper = _intersection(chambers)
+        rows.insert(0, (ca.SX.eye(self._arm.n_chambers), lower / step, upper / step))
+        matrix, least, most = (ca.vertcat(*parts) for parts in zip(*rows, strict=True))
+        return matrix, least, most
+
+
+def _is_diagonal(matrix: ca.SX) -> bool:
+    """Whether every row depends on its own chamber alone."""
+    rows, columns = matrix.sparsity().get_triplet()
+    return list(rows) == list(columns)
+
+
+def _intersection(bounds: list[tuple[ca.SX, ca.SX]]) -> tuple[ca.SX, ca.SX]:
+    """Bounds (n,) that respect all of them; where they exclude each other, the lower ones."""
+    lower, upper = bounds[0]
+    for low, high in bounds[1:]:
+        lower, upper = ca.fmax(lower, low), ca.fmin(upper, high)
+        upper = ca.fmax(upper, lower)
+    return lower, upper
 
 
 def _nonzeros(matrix: ca.SX) -> ca.SX:

@@ -1,1 +1,1 @@
-"""Limits: what no step may exceed, as rows of ``lower <= G dq <= upper``."""
+"""Limits: what no commanded lengths may exceed, each as what is left of it."""

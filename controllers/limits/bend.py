@@ -8,31 +8,30 @@ from pneuarm.controllers.kinematics.constant_curvature import (
     lengths_from_shapes,
     shapes_from_lengths,
 )
+from pneuarm.controllers.limits.limit import Limit
 
 #: Far below any length that matters; keeps a division defined and a comparison safe.
 _TINY_M = 1e-12
 
 
-class BendLimit:
+class BendLimit(Limit):
     """Keeps the bending angle of every section within ``bend_max_rad``.
 
     The limit is a cone around the straight arm, which a step along it leaves at second order: so
     the QP leaves a margin.
     """
 
+    name, bit = "bend", 2
     margin_m = 2e-6
+    convex = in_workspace = True
 
     def __init__(self, arm: Arm) -> None:
-        self.bend_max_rad = arm.per_section("bend_max_rad").reshape(-1)
+        super().__init__(arm)
+        self._bend_max_rad = arm.per_section("bend_max_rad").reshape(-1)
         self._offset_m = arm.per_section("chamber_offset_m")
         # d times the derivative of (u, v) over a section's three lengths: the rows are in metres.
         self._gradient = shapes_from_lengths(np.eye(3), 1.0)[:, 1:].T
-        self._largest_m = self._offset_m * self.bend_max_rad[:, None]
-
-    def _bends(self, lengths_m: Array) -> tuple[Array, Array]:
-        """Bending vectors times d (n_sections, 2) and their norms (n_sections, 1), both in m."""
-        vectors = lengths_m @ self._gradient.T
-        return vectors, np.sqrt(np.add.reduce(vectors * vectors, axis=1, keepdims=True))
+        self._largest_m = self._offset_m * self._bend_max_rad[:, None]
 
     def slack(self, lengths: ca.SX) -> ca.SX:
         """What is left of every section's bend, times d."""
@@ -40,21 +39,18 @@ class BendLimit:
         norms = ca.sqrt(ca.sum1(vectors * vectors) + _TINY_M**2)  # smooth at the straight arm
         return ca.DM(self._largest_m[:, 0]) - norms.T
 
-    def slack_m(self, lengths_m: Array) -> Array:
-        """What is left of the bend, times d (m), for every section (n_sections,)."""
-        slack: Array = (self._largest_m - self._bends(lengths_m)[1])[:, 0]
-        return slack
-
     def clip(self, lengths_m: Array) -> Array:
         """Unbend the sections that are beyond the limit, at constant arc length.
 
         A length moves toward the mean of its section, so bounds that held before hold after.
         """
-        if (self._bends(lengths_m)[1] <= self._largest_m - _TINY_M).all():
+        vectors = lengths_m @ self._gradient.T
+        bends = np.sqrt(np.add.reduce(vectors * vectors, axis=1, keepdims=True))
+        if (bends <= self._largest_m - _TINY_M).all():
             return lengths_m
         shapes = shapes_from_lengths(lengths_m, self._offset_m)
         theta = np.sqrt(shapes[:, 1] ** 2 + shapes[:, 2] ** 2)
-        excess = theta > self.bend_max_rad
-        factor = np.where(excess, self.bend_max_rad / np.where(excess, theta, 1.0), 1.0)
+        excess = theta > self._bend_max_rad
+        factor = np.where(excess, self._bend_max_rad / np.where(excess, theta, 1.0), 1.0)
         shapes[:, 1:] *= factor[:, None]
         return np.where(excess[:, None], lengths_from_shapes(shapes, self._offset_m), lengths_m)

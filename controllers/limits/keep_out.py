@@ -3,11 +3,10 @@
 from itertools import pairwise
 
 import casadi as ca
-import numpy as np
 
-from pneuarm.controllers.arm.arm import Arm, Array, KeepOut, Sphere
-from pneuarm.controllers.geometry.compiled_function import CompiledFunction
+from pneuarm.controllers.arm.arm import Arm, KeepOut, Sphere
 from pneuarm.controllers.kinematics.compiled import symbolic_section, symbolic_shape
+from pneuarm.controllers.limits.limit import Limit
 
 #: Pieces of every section between two sampled stations of its backbone.
 PIECES = 10
@@ -15,21 +14,21 @@ PIECES = 10
 _TINY = 1e-24
 
 
-class KeepOutLimit:
+class KeepOutLimit(Limit):
     """Keeps every point of the backbone ``body_radius_m`` away from every keep-out.
 
     Between two stations the backbone is taken as their chord, and what the arc stands off from it
     (at most ``L theta / (8 PIECES^2)``, below 2 mm) is taken away: never less than the truth.
     """
 
+    name, bit = "keep-out", 8
     margin_m = 1e-4
+    at_bound_m = 2.0 * margin_m
 
-    def __init__(self, arm: Arm) -> None:
-        self._arm = arm
-        lengths = ca.SX.sym("lengths", arm.n_chambers)
-        self._compiled = CompiledFunction("clearances", [lengths], [self.slack(lengths)])
-        self._lengths = np.zeros(arm.n_chambers)
-        self._compiled.bind([self._lengths])
+    @classmethod
+    def applies_to(cls, arm: Arm) -> bool:
+        """Whether there is a place to keep out of."""
+        return bool(arm.keep_outs)
 
     def slack(self, lengths: ca.SX) -> ca.SX:
         """Clearance of every section from every keep-out: keep-outs in turn, base first."""
@@ -41,11 +40,16 @@ class KeepOutLimit:
         ]
         return ca.vertcat(*clearances) if clearances else ca.SX(0, 1)
 
-    def left_m(self, lengths_m: Array) -> Array:
-        """Return the clearances at lengths (n_sections, 3), as in :meth:`slack`; reused arrays."""
-        self._lengths[:] = lengths_m.reshape(-1)
-        self._compiled.call()
-        return self._compiled.results[0]
+    def contradiction(self) -> str:
+        """Which keep-out contains a part of the arm at rest."""
+        left_m = self.left_m(self._arm.rest_lengths_m)
+        if (left_m >= 0.0).all():
+            return ""
+        place, section = divmod(int(left_m.argmin()), self._arm.n_sections)
+        return (
+            f"keep_outs[{place}] contains a part of section {section + 1} of the arm at rest, by "
+            f"{-1e3 * left_m.min():.3g} mm (body_radius_mm counts); move it or make it smaller"
+        )
 
 
 def _stations(arm: Arm, lengths: ca.SX) -> list[tuple[list[ca.SX], ca.SX]]:

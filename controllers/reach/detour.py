@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.actuation.symbols import is_plain
 from pneuarm.controllers.arm.arm import CHAMBER_ANGLES_RAD, Arm, Array
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.limits.limits import workspace_is_exact
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 
 #: A goal counts as better than where the tip is from this much on, m.
@@ -39,16 +39,16 @@ _COS, _SIN = np.cos(CHAMBER_ANGLES_RAD).tolist(), np.sin(CHAMBER_ANGLES_RAD).tol
 class Detour:
     """Says when to go by the lengths, and to which."""
 
-    def __init__(self, arm: Arm, limits: Limits) -> None:
+    def __init__(self, arm: Arm) -> None:
         self._arm, self._plain = arm, is_plain(arm)
         self._pressure_map = PressureMap(arm)
         self._pressure_low = arm.per_chamber("pressure_min_pa") - _AT_RANGE_PA
         self._pressure_high = arm.per_chamber("pressure_max_pa") + _AT_RANGE_PA
-        self._low_m = float(limits.length.lower_m[0, 0])
-        self._high_m = float(limits.length.upper_m[0, 0])
+        low, high = length_bounds_m(arm)
+        self._low_m, self._high_m = float(low[0, 0]), float(high[0, 0])
         # A keep-out is no convex set: there the straight way of the lengths may be closed too. The
         # inverse is closed for the backbone's end, not for a tool beyond it.
-        self._possible = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
+        self._possible = workspace_is_exact(arm)
         self.goal_m: Array | None = None
         self.taken = False
         #: How far from its goal the tip may be for no other reason than that the goal moves.

@@ -1,12 +1,8 @@
-"""How the commanded arm stands to its target, and what stops it."""
+"""How the commanded arm stands to its target: on the way, there, or out of reach."""
 
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 
 import numpy as np
-
-from pneuarm.controllers.actuation.pressure_map import PressureMap
-from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
-from pneuarm.controllers.limits.limits import AT_BOUND_M, Limits
 
 
 class Reach(IntEnum):
@@ -16,16 +12,6 @@ class Reach(IntEnum):
     MOVING = 1
     REACHED = 2
     OUT_OF_REACH = 3
-
-
-class Binding(IntFlag):
-    """Which limits stop the commanded arm, as bits on the wire."""
-
-    NOTHING = 0
-    LENGTH = 1
-    BEND = 2
-    PRESSURE = 4
-    KEEP_OUT = 8
 
 
 class Progress:
@@ -59,41 +45,3 @@ class Progress:
         elif self._best_m - error_m >= min(self._least_m, 0.5 * self._best_m):
             self._best_m, self._still_s = error_m, 0.0
         return Reach.OUT_OF_REACH if self._still_s >= self._stalled_s else Reach.MOVING
-
-
-class BindingLimits:
-    """Says which limits some lengths touch."""
-
-    def __init__(self, arm: Arm, limits: Limits) -> None:
-        self._limits = limits
-        self._low_m = arm.per_chamber("length_min_m") + LENGTH_MARGIN_M
-        self._high_m = arm.per_chamber("length_max_m") - LENGTH_MARGIN_M
-        self._pressure_map = PressureMap(arm)
-        at_bound_pa = AT_BOUND_M / arm.per_chamber("lengthening_m_per_pa")
-        self._low_pa = arm.per_chamber("pressure_min_pa") + at_bound_pa
-        self._high_pa = arm.per_chamber("pressure_max_pa") - at_bound_pa
-        self._keep_outs = bool(arm.keep_outs)
-
-    def at(self, lengths_m: Array) -> Binding:
-        """Limits of which less than AT_BOUND_M is left at lengths (n_sections, 3)."""
-        binding = Binding.NOTHING
-        left = np.minimum(lengths_m - self._low_m, self._high_m - lengths_m)
-        if (left < AT_BOUND_M).any():
-            binding |= Binding.LENGTH
-        if (self._limits.bend.slack_m(lengths_m) < AT_BOUND_M).any():
-            binding |= Binding.BEND
-        pressures = self._pressure_map.pressures_pa(lengths_m)
-        if ((pressures < self._low_pa) | (pressures > self._high_pa)).any():
-            binding |= Binding.PRESSURE
-        if (
-            self._keep_outs
-            and (
-                self._limits.keep_out.left_m(lengths_m) < 2.0 * self._limits.keep_out.margin_m
-            ).any()
-        ):
-            binding |= Binding.KEEP_OUT
-        return binding
-
-    def _at_keep_out(self, lengths_m: Array) -> bool:
-        limit = self._limits.keep_out
-        return bool((limit.left_m(lengths_m) < 2.0 * limit.margin_m).any())

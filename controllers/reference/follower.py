@@ -14,18 +14,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array, Response
-from pneuarm.controllers.geometry.frames import rotation_from_vector, rotation_vector, spin_of
+from pneuarm.controllers.geometry.moving_point import MovingPoint
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+    rotation_vector,
+    spin_of,
+)
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.reference.stream import STREAM_S, Stream
 from pneuarm.controllers.reference.trajectory import (
     Goal,
-    Motion,
     Reference,
     ReferenceLimits,
     standing,
 )
 from pneuarm.controllers.targets.targets import PoseTarget, PositionTarget, ShapeTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
 
 #: One metre of the limits allows this many radians.
 _TURN_PER_M = 10.0
@@ -72,7 +77,7 @@ class Follower:
         self._lead, self._gain_per_s, self._jerk_max = lead, gain_per_s, limits.jerk_m_s3
         self._largest_m_s = limits.speed_m_s * 3.0**-0.5
         self._stream = Stream()
-        self._on_the_way: deque[Motion] = deque(maxlen=round(lead.ahead_s / period_s) + 1)
+        self._on_the_way: deque[MovingPoint] = deque(maxlen=round(lead.ahead_s / period_s) + 1)
         self.forget()
 
     def forget(self) -> None:
@@ -97,7 +102,7 @@ class Follower:
         return self._reference is None or (self._reference.arrived and not self._moving_goal)
 
     @property
-    def motion(self) -> Motion | None:
+    def motion(self) -> MovingPoint | None:
         """Where the tip is to be now: the reference as it was when it was that far ahead."""
         if self._reference is None:
             return None
@@ -111,7 +116,7 @@ class Follower:
             return [math.nan] * 3
         if self._reference is not None and self._reference.arrived:
             return self._on_the_way[0].position
-        return target.shape.at(min(self._shape_s, target.shape.duration_s)).position
+        return target.at(min(self._shape_s, target.duration_s)).position
 
     @property
     def error(self) -> str:
@@ -125,10 +130,10 @@ class Follower:
             return
         if isinstance(target, ShapeTarget):
             known = self._target
-            if isinstance(known, ShapeTarget) and known.key == target.key:
+            if isinstance(known, ShapeTarget) and known == target:
                 return
             self._start_position(tip, velocity_m_s)
-            self._go(self._position, target.shape.at, moving=True)
+            self._go(self._position, target.at, moving=True)
             self._shape_s = 0.0
         elif isinstance(target, PositionTarget):
             self._set_position(target, at_s, tip, velocity_m_s)
@@ -145,9 +150,9 @@ class Follower:
         zeros, moving = [0.0] * len(position), any(velocity)
         start_s = self._lead.ahead_s
 
-        def at(ahead_s: float) -> Motion:
+        def at(ahead_s: float) -> MovingPoint:
             moved = [p + (start_s + ahead_s) * v for p, v in zip(position, velocity, strict=True)]
-            return Motion(moved, velocity, zeros)
+            return MovingPoint(moved, velocity, zeros)
 
         self._reference, self._moving_goal, self._since_s = reference, moving, 0.0
         (reference.stream if moving else reference.go)(at)
@@ -193,14 +198,14 @@ class Follower:
         moves = [*velocity.tolist(), 0.0, 0.0, 0.0]
         self._pass(self._pose, [*target.position_m.tolist(), *turn], moves)
 
-    def _linear(self, tip: TipState, velocity_m_s: Array) -> Motion:
+    def _linear(self, tip: TipState, velocity_m_s: Array) -> MovingPoint:
         """Where a new way of the position starts: at the reference, or at the tip."""
         reference = self._reference
         if reference is not None:
             position, velocity, acceleration = (part[:3] for part in reference.now)
             if math.dist(position, tip.position_m.tolist()) < self._lost_m(velocity):
-                return Motion(position, velocity, acceleration)
-        return Motion(tip.position_m.tolist(), velocity_m_s.tolist(), [0.0] * 3)
+                return MovingPoint(position, velocity, acceleration)
+        return MovingPoint(tip.position_m.tolist(), velocity_m_s.tolist(), [0.0] * 3)
 
     def _lost_m(self, velocity: list[float]) -> float:
         """The law is ahead of the reference by the lead: that alone does not make it lost."""
@@ -252,7 +257,7 @@ class Follower:
         turned = rotation_from_vector(ahead[3:]) @ self._chart
         return PoseTarget(ahead[:3], quaternion_from_rotation(turned), self._target.law)
 
-    def _rate(self, motion: Motion, dt_s: float) -> list[float]:
+    def _rate(self, motion: MovingPoint, dt_s: float) -> list[float]:
         """Velocity (3,) of what the law is given, with the jerk within its limit."""
         by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
         most, rate = self._jerk_max, []
@@ -276,8 +281,8 @@ class Follower:
             return
         target = self._target
         if isinstance(target, ShapeTarget):
-            if self._since_s >= target.shape.duration_s and reference.arrived:
-                end = target.shape.at(target.shape.duration_s).position
+            if self._since_s >= target.duration_s and reference.arrived:
+                end = target.at(target.duration_s).position
                 self._go(reference, standing(end), moving=False)
         elif self._since_s > STREAM_S and isinstance(target, PositionTarget):
             self._go(reference, standing(target.position_m.tolist()), moving=False)

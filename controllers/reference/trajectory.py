@@ -9,9 +9,10 @@ a goal is drawn to it, which is smooth where plan after plan would not be.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from ruckig import InputParameter, Ruckig, RuckigError, Synchronization, Trajectory
+
+from pneuarm.controllers.geometry.moving_point import MovingPoint
 
 #: What a goal may ask of the limits: at the limits themselves rounding makes Ruckig refuse.
 _SHARE = 0.98
@@ -40,16 +41,8 @@ class ReferenceLimits:
     jerk_m_s3: float = 20.0
 
 
-class Motion(NamedTuple):
-    """Position, velocity and acceleration of a point, plain lists of n numbers."""
-
-    position: list[float]
-    velocity: list[float]
-    acceleration: list[float]
-
-
 #: Where a goal is so many seconds from now.
-Goal = Callable[[float], Motion]
+Goal = Callable[[float], MovingPoint]
 
 
 class Reference:
@@ -84,7 +77,9 @@ class Reference:
         """Be at a position, moving or not, with nowhere to go yet but to rest there."""
         zeros = [0.0] * self.size
         moving = _clipped(velocity or zeros, self._speed_max)
-        self.now = Motion(position, moving, _clipped(acceleration or zeros, self._acceleration_max))
+        self.now = MovingPoint(
+            position, moving, _clipped(acceleration or zeros, self._acceleration_max)
+        )
         self._goal = standing(position)
         self._plan: Trajectory | None = None
         self._since_s = self._plan_s = self._drawn_per_s = 0.0
@@ -148,10 +143,10 @@ class Reference:
     def _meets(self, plan: Trajectory, goal: Goal) -> bool:
         """Whether the plan ends so near the goal that the point can be drawn to it from there."""
         left_s = max(0.0, plan.duration - self._plan_s)
-        end = Motion(*plan.at_time(plan.duration))
+        end = MovingPoint(*plan.at_time(plan.duration))
         return self._pull_per_s(end, goal(left_s)) >= _PULL_MIN_PER_S
 
-    def _pull_per_s(self, now: Motion, aim: Motion) -> float:
+    def _pull_per_s(self, now: MovingPoint, aim: MovingPoint) -> float:
         """How stiffly a point may be drawn to the goal within the limits; 0 for not at all.
 
         It is less where the point is far away or has another speed, so that no jerk is cut off:
@@ -166,7 +161,7 @@ class Reference:
                 return 0.0
         return pull
 
-    def _draw(self, dt_s: float) -> Motion:
+    def _draw(self, dt_s: float) -> MovingPoint:
         """Move on by one tick: three equal poles, within the limits of acceleration and jerk."""
         aim, k, moved = self._goal(self._since_s), self._drawn_per_s, []
         for p, v, a, g, w, most, jerk in zip(
@@ -187,9 +182,9 @@ class Reference:
                     changed,
                 )
             )
-        return Motion(*(list(part) for part in zip(*moved, strict=True)))
+        return MovingPoint(*(list(part) for part in zip(*moved, strict=True)))
 
-    def step(self, dt_s: float) -> Motion:
+    def step(self, dt_s: float) -> MovingPoint:
         """Move on by one tick; return where the reference is then.
 
         The goal's own time began when it was given to :meth:`go` or :meth:`stream`.
@@ -197,7 +192,7 @@ class Reference:
         self._since_s += dt_s
         self._plan_s += dt_s
         if self._plan is not None and self._plan_s < self._plan.duration:
-            self.now = Motion(*self._plan.at_time(self._plan_s))
+            self.now = MovingPoint(*self._plan.at_time(self._plan_s))
         elif self._streams:
             if self._plan is not None:
                 pull_per_s = self._pull_per_s(self.now, self._goal(self._since_s))
@@ -222,5 +217,5 @@ def _clipped(values: list[float], limits: list[float]) -> list[float]:
 def standing(position: list[float]) -> Goal:
     """Return a goal that does not move."""
     zeros = [0.0] * len(position)
-    motion = Motion(position, zeros, zeros)
+    motion = MovingPoint(position, zeros, zeros)
     return lambda ahead_s: motion

@@ -1,1 +1,1 @@
-"""What can be asked of the arm: positions, poses, twists, shapes."""
+"""What can be asked of the arm: a file a kind, with its checks and the task that it becomes."""

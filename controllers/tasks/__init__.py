@@ -1,1 +1,1 @@
-"""Tasks: what the tip or the chambers should do, as a wanted rate and its Jacobian."""
+"""What is wanted, as a vector of parameters, and the weighted rows that it stands for."""

@@ -1,25 +1,45 @@
-"""The tasks in CasADi symbols: errors, velocities and Jacobians over the chamber lengths."""
+"""What is wanted in CasADi symbols: errors, velocities and Jacobians over the chamber lengths."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.geometry.rotations import symbolic_angle_vector, symbolic_rotation_vector
 from pneuarm.controllers.kinematics.compiled import symbolic_tip
 from pneuarm.controllers.tasks.wanted import ORIENTATION_LENGTH_M
 
 Parts = Mapping[str, ca.SX]
 
-#: Sine of an angle (rad) below which the vector of a rotation needs no division.
-_SMALL = 1e-9
+
+class Block(NamedTuple):
+    """Rows that go together, weighted: error (k,), velocity wanted (k,), Jacobian; in metres.
+
+    ``squared`` (m^2) is the squared error without the weight, where it counts.
+    """
+
+    error: ca.SX
+    velocity: ca.SX
+    jacobian: ca.SX
+    squared: ca.SX
+
+
+def block(weight: ca.SX, error: ca.SX, velocity: ca.SX, jacobian: ca.SX) -> Block:
+    """Weigh rows in metres."""
+    root = ca.sqrt(weight)
+    return Block(root * error, root * velocity, root * jacobian, _counted(weight, error))
+
+
+#: What gives the rows of one kind of target over the lengths (n_chambers,), None for none.
+RowsOf = Callable[[Arm, ca.SX, Parts], Block | None]
 
 
 class Rows(NamedTuple):
-    """Weighted rows of all tasks but the chambers': every one in metres.
+    """Weighted rows of all that is wanted but the chambers': every one in metres.
 
     ``error`` (m,), ``velocity`` (m,) of what is wanted, m/s, and ``jacobian`` (m, n_chambers).
-    ``error_m`` is how far the tasks are from done, without their weights. ``transform`` (4, 4) and
+    ``error_m`` is how far it is from done, without their weights. ``transform`` (4, 4) and
     ``tip_jacobian`` (6, n_chambers) are the model's tip, uncorrected.
     """
 
@@ -31,8 +51,10 @@ class Rows(NamedTuple):
     tip_jacobian: ca.SX
 
 
-def symbolic_rows(arm: Arm, lengths: ca.SX, want: Parts, whole: bool) -> Rows:
-    """Rows of what is wanted at ``lengths`` (n_chambers,).
+def symbolic_rows(
+    arm: Arm, lengths: ca.SX, want: Parts, own: Sequence[RowsOf], whole: bool
+) -> Rows:
+    """Rows of what is wanted at ``lengths`` (n_chambers,), with those of single kinds, ``own``.
 
     Without ``whole`` only the tip's position counts: half the arithmetic, and the usual case.
     """
@@ -40,31 +62,31 @@ def symbolic_rows(arm: Arm, lengths: ca.SX, want: Parts, whole: bool) -> Rows:
     seen, turned = position + want["offset_m"], want["turn"] @ rotation
     linear, angular = _velocities(want, seen, turned)
     miss = want["position_follows"] * (want["position_m"] - seen)
-    weight = ca.sqrt(want["position_weight"])
-    blocks = [(weight * miss, weight * linear, weight * jacobian[:3, :])]
-    squared = _counted(want["position_weight"], miss)
+    blocks = [block(want["position_weight"], miss, linear, jacobian[:3, :])]
     if whole:
-        turn = ORIENTATION_LENGTH_M * _orientation_error(want, turned)
-        weight = ca.sqrt(want["orientation_weight"])
-        free = want["direction_follows"] * turned[:, 2] @ turned[:, 2].T
-        spin = ORIENTATION_LENGTH_M * weight * (want["turn"] @ jacobian[3:, :])
-        blocks.append((weight * turn, ORIENTATION_LENGTH_M * weight * angular, spin - free @ spin))
-        offset, carried = _point(arm, lengths, want)
-        weight = ca.sqrt(want["point_weight"])
-        blocks.append((weight * offset, ca.SX(3, 1), weight * carried))
-        squared += _counted(want["orientation_weight"], turn)
-        squared += _counted(want["point_weight"], offset)
+        blocks.append(_orientation(want, turned, angular, jacobian[3:, :]))
+        blocks += [rows for rows_of in own if (rows := rows_of(arm, lengths, want)) is not None]
     chambers = ca.norm_inf(want["lengths_m"] - lengths) * (want["lengths_weight"] > 0)
-    transform = ca.vertcat(ca.horzcat(rotation, position), ca.DM([[0.0, 0.0, 0.0, 1.0]]))
-    error, velocity, moves = (ca.vertcat(*parts) for parts in zip(*blocks, strict=True))
+    error, velocity, moves, squared = zip(*blocks, strict=True)
     return Rows(
-        error,
-        velocity,
-        moves,
-        ca.fmax(ca.sqrt(squared), chambers),
-        transform,
+        ca.vertcat(*error),
+        ca.vertcat(*velocity),
+        ca.vertcat(*moves),
+        ca.fmax(ca.sqrt(sum(squared, ca.SX(0))), chambers),
+        ca.vertcat(ca.horzcat(rotation, position), ca.DM([[0.0, 0.0, 0.0, 1.0]])),
         jacobian,
     )
+
+
+def _orientation(want: Parts, turned: ca.SX, angular: ca.SX, jacobian: ca.SX) -> Block:
+    """Rows of the tip's rotation, in metres; where it points alone leaves out the axis itself."""
+    turn = ORIENTATION_LENGTH_M * _orientation_error(want, turned)
+    weight = want["orientation_weight"]
+    root = ca.sqrt(weight)
+    free = want["direction_follows"] * turned[:, 2] @ turned[:, 2].T
+    spin = ORIENTATION_LENGTH_M * root * (want["turn"] @ jacobian)
+    rate = ORIENTATION_LENGTH_M * root * angular
+    return Block(root * turn, rate, spin - free @ spin, _counted(weight, turn))
 
 
 def _counted(weight: ca.SX, error: ca.SX) -> ca.SX:
@@ -84,43 +106,9 @@ def _orientation_error(want: Parts, rotation: ca.SX) -> ca.SX:
     axis = rotation[:, 2]
     across, along = ca.cross(axis, want["direction"]), ca.dot(axis, want["direction"])
     # Exactly the other way round every axis across is as good: the tip's own x.
-    pointing = _angle_vector(across, along, rotation[:, 0])
+    pointing = symbolic_angle_vector(across, along, rotation[:, 0])
     whole = want["rotation"] @ rotation.T
     return (
         want["rotation_follows"] * symbolic_rotation_vector(whole)
         + want["direction_follows"] * pointing
     )
-
-
-def symbolic_rotation_vector(rotation: ca.SX) -> ca.SX:
-    """Axis times angle (3,), rad; angles up to pi."""
-    axial = 0.5 * ca.vertcat(
-        rotation[2, 1] - rotation[1, 2],
-        rotation[0, 2] - rotation[2, 0],
-        rotation[1, 0] - rotation[0, 1],
-    )
-    # Half a turn: R = 2 a a^T - I, and either sign of the axis is right.
-    first, second, third = (rotation[:, k] + ca.SX.eye(3)[:, k] for k in range(3))
-    column = ca.if_else(
-        ca.fmax(rotation[1, 1], rotation[2, 2]) < rotation[0, 0],
-        first,
-        ca.if_else(rotation[2, 2] < rotation[1, 1], second, third),
-    )
-    axis = column / ca.fmax(ca.norm_2(column), _SMALL)
-    return _angle_vector(axial, 0.5 * (ca.trace(rotation) - 1.0), axis)
-
-
-def _angle_vector(across: ca.SX, cosine: ca.SX, otherwise: ca.SX) -> ca.SX:
-    """Angle along ``across`` (3,), whose norm is the sine; half a turn goes about ``otherwise``."""
-    sine = ca.norm_2(across)
-    small = ca.if_else(cosine > 0.0, across, ca.pi * otherwise)
-    factor = ca.atan2(sine, cosine) / ca.fmax(sine, _SMALL)
-    return ca.if_else(sine > _SMALL, factor * across, small)
-
-
-def _point(arm: Arm, lengths: ca.SX, want: Parts) -> tuple[ca.SX, ca.SX]:
-    """Offset (3,) of the backbone's point from where it should be, and its Jacobian."""
-    along = arm.n_sections * want["station"]
-    shares = [ca.fmin(ca.fmax(along - index, 0.0), 1.0) for index in range(arm.n_sections)]
-    position, _, jacobian = symbolic_tip(arm, lengths, shares)
-    return want["point_m"] - position, jacobian[:3, :]

@@ -1,7 +1,7 @@
-"""What the tasks ask for, as one vector of parameters of the compiled step.
+"""What is wanted, as one vector of parameters of the compiled step.
 
-Every task writes its part of the vector, and :mod:`pneuarm.controllers.tasks.rows` reads it as
-symbols: so one compiled function serves every task and every combination of them, and nothing is
+Every target writes its part of the vector, and :mod:`pneuarm.controllers.tasks.rows` reads it as
+symbols: so one compiled function serves every kind and every combination of them, and nothing is
 compiled when a target comes.
 """
 
@@ -37,27 +37,23 @@ _SIZES = {
     "angular_rad_s": 3,
     "in_tip_frame": 1,
     "about_base_origin": 1,
-    # A point of the backbone: 0 at the base, 1 at the tip.
-    "point_m": 3,
-    "point_weight": 1,
-    "station": 1,
     # The chambers, with what is left of the freedoms (posture) or by weight.
     "lengths_weight": 1,
     "posture_weight": 1,
 }
 
 
-def _slices(n_chambers: int) -> dict[str, slice]:
+def _slices(n_chambers: int, own: Mapping[str, int]) -> dict[str, slice]:
     slices, start = {}, 0
-    for name, size in (_SIZES | {"lengths_m": n_chambers}).items():
+    for name, size in {**_SIZES, **own, "lengths_m": n_chambers}.items():
         slices[name] = slice(start, start + size)
         start += size
     return slices
 
 
-def symbols(n_chambers: int) -> tuple[ca.SX, Mapping[str, ca.SX]]:
+def symbols(n_chambers: int, own: Mapping[str, int]) -> tuple[ca.SX, Mapping[str, ca.SX]]:
     """Return the whole vector as a symbol, and its parts by name; rotations are (3, 3)."""
-    slices = _slices(n_chambers)
+    slices = _slices(n_chambers, own)
     whole = ca.SX.sym("wanted", slices["lengths_m"].stop)
     parts = {name: whole[where] for name, where in slices.items()}
     for name in ("rotation", "turn"):  # in C order
@@ -66,13 +62,17 @@ def symbols(n_chambers: int) -> tuple[ca.SX, Mapping[str, ca.SX]]:
 
 
 class Wanted:
-    """The vector for one arm; ``values`` keeps its place in memory for the compiled functions."""
+    """The vector for one arm; ``values`` keeps its place in memory for the compiled functions.
 
-    def __init__(self, n_chambers: int) -> None:
-        slices = _slices(n_chambers)
+    ``own`` are the parameters that single kinds of targets have to themselves: name and size.
+    """
+
+    def __init__(self, n_chambers: int, own: Mapping[str, int]) -> None:
+        slices = _slices(n_chambers, own)
         self.values: Array = np.zeros(slices["lengths_m"].stop)
         self._parts = {name: self.values[where] for name, where in slices.items()}
         self._asked = self.values[slices["position_m"].start :]  # gains and correction lie before
+        self._own = tuple(self._parts[name] for name in own)
         self["turn"] = np.eye(3)
 
     def __setitem__(self, name: str, value: ArrayLike) -> None:
@@ -83,6 +83,11 @@ class Wanted:
 
     def __getitem__(self, name: str) -> Array:
         return self._parts[name]
+
+    @property
+    def beyond_position(self) -> bool:
+        """Whether more of the arm is asked for than where its tip or its chambers are."""
+        return bool(self["orientation_weight"][0]) or any(part.any() for part in self._own)
 
     def correct(self, offset_m: Array, turn: Array) -> None:
         """See the tip at ``p(q) + offset_m`` (3,) with the rotation ``turn R(q)``, (3, 3)."""

@@ -9,7 +9,9 @@ from pneuarm.controllers.actuation.pressure_map import length_bounds_m, pressure
 from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
-from pneuarm.controllers.reach.reach import Binding
+from pneuarm.controllers.limits.bend import BendLimit
+from pneuarm.controllers.limits.length import LengthLimit
+from pneuarm.controllers.limits.pressure import PressureLimit
 
 Flags = NDArray[np.bool_]
 
@@ -18,12 +20,12 @@ Flags = NDArray[np.bool_]
 class Reachability:
     """Whether a position can be reached, and which point can where it cannot.
 
-    ``limits`` are those that the arm touches at ``nearest_m`` (3,), the reachable point next to
-    the position; NOTHING, the position itself and ``distance_m`` 0 for a position within reach.
+    ``limits`` are the bits of those that the arm touches at ``nearest_m`` (3,), the reachable point
+    next to the position; 0, the position itself and ``distance_m`` 0 for one within reach.
     """
 
     reachable: bool
-    limits: Binding
+    limits: int
     nearest_m: Array
     distance_m: float
 
@@ -31,8 +33,8 @@ class Reachability:
 class LimitNames:
     """Says which limits some lengths ``(n_sections, 3)`` exceed or touch, as the controller does.
 
-    A chamber at its end of travel counts as PRESSURE where the pressure range ends before the
-    interval of Eq. (4), else as LENGTH.
+    A chamber at its end of travel counts as pressure where the pressure range ends before the
+    interval of Eq. (4), else as length.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -43,7 +45,7 @@ class LimitNames:
         self._low_is_pressure = low > arm.per_chamber("length_min_m") + LENGTH_MARGIN_M
         self._high_is_pressure = high < arm.per_chamber("length_max_m") - LENGTH_MARGIN_M
 
-    def within(self, lengths_m: Array, margin_m: float) -> Binding:
+    def within(self, lengths_m: Array, margin_m: float) -> int:
         """Limits of which less than ``margin_m`` is left; a negative margin means exceeded.
 
         The bend counts times the chamber offset, so that it is in metres too.
@@ -54,13 +56,13 @@ class LimitNames:
         bend_left = self.bend_max_rad - np.hypot(shapes[:, 1], shapes[:, 2])
         return self._named(low, high, bool((self.offset_m[:, 0] * bend_left < margin_m).any()))
 
-    def _named(self, low: Flags, high: Flags, bend: bool) -> Binding:
+    def _named(self, low: Flags, high: Flags, bend: bool) -> int:
         by_pressure = (low & self._low_is_pressure) | (high & self._high_is_pressure)
-        flags = Binding.BEND if bend else Binding.NOTHING
+        flags = BendLimit.bit if bend else 0
         if by_pressure.any():
-            flags |= Binding.PRESSURE
+            flags |= PressureLimit.bit
         if ((low | high) & ~by_pressure).any():
-            flags |= Binding.LENGTH
+            flags |= LengthLimit.bit
         return flags
 
 

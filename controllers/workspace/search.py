@@ -22,10 +22,9 @@ from pneuarm.controllers.kinematics.constant_curvature import (
     shapes_from_lengths,
     tip_transform,
 )
-from pneuarm.controllers.laws.motion import Motion
-from pneuarm.controllers.limits.limits import AT_BOUND_M
-from pneuarm.controllers.reach.reach import Binding
-from pneuarm.controllers.tasks.tip_position import TipPosition
+from pneuarm.controllers.laws.commanded_chambers import CommandedChambers
+from pneuarm.controllers.limits.limit import AT_BOUND_M
+from pneuarm.controllers.targets.position import PositionTarget
 from pneuarm.controllers.workspace.reachability import LimitNames, Reachability
 from pneuarm.controllers.workspace.region import folded, unfolded
 from pneuarm.controllers.workspace.support import Support, wedge_directions
@@ -74,7 +73,7 @@ class SearchedRegion:
         self._kinematics = CompiledKinematics(arm)
         # In a search the only rate limit is the length of its steps.
         quick = tuple(replace(section, **_QUICK) for section in arm.sections)
-        self._motion = Motion(replace(arm, sections=quick))
+        self._chambers = CommandedChambers(replace(arm, sections=quick))
 
     def contains(self, positions_m: Array) -> NDArray[np.bool_]:
         """Membership of positions ``(..., 3)``, one search each."""
@@ -90,7 +89,7 @@ class SearchedRegion:
             again = self._from_boundary(inside)
             lengths, distance = min((lengths, distance), again, key=lambda pair: pair[1])
         if distance <= self.tolerance_m:
-            return Reachability(True, Binding.NOTHING, position_m.copy(), 0.0)
+            return Reachability(True, 0, position_m.copy(), 0.0)
         limits = self.limits.within(lengths, AT_BOUND_M)
         return Reachability(False, limits, unfolded(self.tip_m(lengths), turn, side), distance)
 
@@ -128,17 +127,17 @@ class SearchedRegion:
 
     def _walk(self, position_m: Array, lengths_m: Array) -> tuple[Array, float]:
         """Follow the QP law to the target; return the best lengths on the way and the distance."""
-        motion = self._motion
-        motion.place(lengths_m)
-        motion.ask(TipPosition(position_m, posture_weight=0.0), 1.0, 2.0 * _STEP_M)
-        motion.place_tip()
-        best, least = lengths_m, motion.error_m
+        chambers = self._chambers
+        chambers.place(lengths_m)
+        chambers.ask(PositionTarget(position_m, posture_weight=0.0), 1.0, 2.0 * _STEP_M)
+        chambers.place_tip()
+        best, least = lengths_m, chambers.error_m
         for _ in range(_STEPS):
-            before = motion.tip.position_m.copy()
-            motion.step(motion.qp_ik, 1.0)
-            if motion.error_m < least:
-                best, least = motion.lengths_m, motion.error_m
-            moved = float(np.abs(motion.tip.position_m - before).max())
+            before = chambers.tip.position_m.copy()
+            chambers.step(chambers.qp_ik, 1.0)
+            if chambers.error_m < least:
+                best, least = chambers.lengths_m, chambers.error_m
+            moved = float(np.abs(chambers.tip.position_m - before).max())
             if least <= self.tolerance_m or moved < _RESTS_M:
                 break
         return best, least

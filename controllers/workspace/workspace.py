@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.controllers.kinematics.constant_curvature import lengths_from_shapes, section_inverse
-from pneuarm.controllers.limits.limits import AT_BOUND_M, Limits
-from pneuarm.controllers.reach.reach import Binding
+from pneuarm.controllers.limits.length import LengthLimit
+from pneuarm.controllers.limits.limit import AT_BOUND_M
+from pneuarm.controllers.limits.limits import Limits
 from pneuarm.controllers.workspace.nearest import BoundarySearch
 from pneuarm.controllers.workspace.reachability import LimitNames, Reachability, checked_positions
 from pneuarm.controllers.workspace.region import ROUNDING_M, SectionRegion
@@ -48,16 +49,16 @@ class SolvedRegion:
     def nearest(self, position_m: Array) -> Reachability:
         """Answer for a position (3,)."""
         if self.region.contains(position_m):
-            return Reachability(True, Binding.NOTHING, position_m.copy(), 0.0)
+            return Reachability(True, 0, position_m.copy(), 0.0)
         nearest = self.boundary.nearest_m(position_m)
         limits = self.region.limits.within(self._lengths_m(nearest), AT_BOUND_M)
         distance = float(np.linalg.norm(position_m - nearest))
         return Reachability(False, limits, nearest, distance)
 
-    def exceeded(self, position_m: Array) -> Binding:
-        """Limits that the one arc to a position (3,) exceeds; LENGTH where no arc ends."""
+    def exceeded(self, position_m: Array) -> int:
+        """Bits of the limits that the one arc to a position exceeds; length where no arc ends."""
         if position_m[0] == position_m[1] == 0.0 and position_m[2] <= 0.0:
-            return Binding.LENGTH
+            return LengthLimit.bit
         return self.region.limits.within(self._lengths_m(position_m), -ROUNDING_M)
 
     def _lengths_m(self, position_m: Array) -> Array:

@@ -17,13 +17,6 @@ from pneuarm.hardware.transports.serial_line import SerialLine
 
 WHAT = "the Ctrl-P controller"
 
-#: Said where it is started without a watchdog: what stays in the arm.
-LEFT_BEHIND = (
-    "the Ctrl-P controller has no watchdog on its host: when this PC or the USB cable dies, it "
-    "goes on regulating the last pressures, and when the controller itself loses its power, its "
-    "closed valves keep the air in the chambers"
-)
-
 #: A reading waits for new telemetry, as many of its periods at most.
 READ_WAIT_PERIODS = 1.5
 #: A setpoint that has not changed, a vent, and the question for the mode are repeated (s).
@@ -54,10 +47,6 @@ class CtrlPSettings:
 
 class CtrlP:
     """One controller on one port; it satisfies :class:`pneuarm.hardware.interface.Hardware`."""
-
-    #: It regulates the last setpoints for ever, whether its host lives or not.
-    has_watchdog = False
-    left_behind = LEFT_BEHIND
 
     def __init__(self, arm: Arm, settings: CtrlPSettings) -> None:
         """Raise ConfigurationError where the wiring or the ceiling does not fit the arm."""

@@ -18,13 +18,6 @@ from pneuarm.hardware.transports.serial_line import SerialLine
 
 WHAT = "the ESP32 controller"
 
-#: Said where it is started without a watchdog: what stays in the arm.
-LEFT_BEHIND = (
-    "the ESP32 controller has no watchdog on its host: when this PC or the USB cable dies, it goes "
-    "on regulating the last pressures, and when the controller itself loses its power, its closed "
-    "valves keep the air in the chambers until it has power again"
-)
-
 #: A reading waits so long for new feedback (s), which comes once a pass.
 READ_WAIT_S = 1.5 * protocol.PASS_S
 #: Of commands that come sooner than this after another the firmware forgets one (s). They follow
@@ -61,10 +54,6 @@ class Esp32:
 
     ``imu_deg`` is the newest roll, pitch and yaw, NaN where there is none.
     """
-
-    #: It regulates the last setpoints for ever, whether its host lives or not.
-    has_watchdog = False
-    left_behind = LEFT_BEHIND
 
     def __init__(self, arm: Arm, settings: Esp32Settings) -> None:
         """Raise ConfigurationError where the arm does not fit the controller, or the wiring."""

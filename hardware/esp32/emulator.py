@@ -6,11 +6,11 @@ of lengths, which fills the chambers without being asked. Nothing here reads a c
 """
 
 import json
-from math import asin, atan2
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.geometry.rotations import roll_pitch_yaw
 from pneuarm.hardware.channels import Channels
 from pneuarm.hardware.emulation.emulation import EmulatedArm
 from pneuarm.hardware.esp32.protocol import CEILING_PA, CHAMBERS, KPA, PASS_S
@@ -89,7 +89,7 @@ class Esp32Emulator:
         return self._channels.scatter(per_chamber)
 
     def _feedback(self) -> bytes:
-        roll, pitch, yaw = np.rad2deg(_roll_pitch_yaw(self.arm.tip()[1])).round(2).tolist()
+        roll, pitch, yaw = np.rad2deg(roll_pitch_yaw(self.arm.tip()[1])).round(2).tolist()
         said = {"imu_roll": roll, "imu_pitch": pitch, "imu_yaw": yaw}
         lengths_mm = self._in_channels(self.arm.lengths_m * 1e3)
         for name, values in (
@@ -99,13 +99,3 @@ class Esp32Emulator:
         ):
             said |= {f"{name}_{index + 1}": round(value, 3) for index, value in enumerate(values)}
         return json.dumps(said, separators=(",", ":")).encode() + b"\r\n"
-
-
-def _roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
-    """Angles about x, then y, then z (rad) of a rotation (3, 3)."""
-    pitch = asin(min(max(-rotation[2, 0], -1.0), 1.0))
-    return (
-        atan2(rotation[2, 1], rotation[2, 2]),
-        pitch,
-        atan2(rotation[1, 0], rotation[0, 0]),
-    )

@@ -54,7 +54,6 @@ class FestoCpx:
         )
         self._written: deque[list[int]] = deque(maxlen=_REMEMBERED_WRITES)
         self._mismatches = 0
-        self.has_watchdog = settings.watchdog.timeout_ms > 0
 
     def connect(self) -> None:
         """Open the connection, zero every output, set the terminal's watchdog, read once."""

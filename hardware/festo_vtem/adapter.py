@@ -61,7 +61,6 @@ class FestoVtem:
         self._terminal = ModbusTerminal(
             NAME, settings.host, settings.port, settings.unit_id, settings.timeout_s
         )
-        self.has_watchdog = settings.watchdog.timeout_ms > 0
 
     def connect(self) -> None:
         """Open the connection, zero every output, and start pressure regulation if it is off."""

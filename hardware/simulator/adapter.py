@@ -43,9 +43,6 @@ class SimulatedArm:
     log.
     """
 
-    #: It lives in its host's memory: when the host ends, no pressure is left.
-    has_watchdog = True
-
     def __init__(self, arm: Arm, nominal: SimulatorParameters, seed: int) -> None:
         drawn = draw(nominal, seed, arm.n_sections)
         self._arm = arm

@@ -7,12 +7,11 @@ arc.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.kinematics.compiled import symbolic_section
 
 
@@ -86,24 +85,6 @@ def _imposed(
     return fall - ca.jtimes(motion, shapes, rates)
 
 
-class _Compiled:
-    """A CasADi function bound to arrays: ``run`` reads the inputs and fills the outputs."""
-
-    def __init__(
-        self, symbols: list[ca.SX], results: list[ca.SX], inputs: list[Array], outputs: list[Array]
-    ) -> None:
-        dense = ca.cse([ca.densify(result) for result in results])
-        self._function = ca.Function("chain", symbols, dense)
-        # CasADi's own annotations leave out that a memoryview is taken without its size.
-        buffer: Any = None
-        buffer, self.run = self._function.buffer()
-        for index, values in enumerate(inputs):
-            buffer.set_arg(index, values.data)
-        for index, output in enumerate(outputs):
-            buffer.set_res(index, output.data)
-        self._buffer = buffer
-
-
 class Chain:
     """``n`` sub-segments in series under a gravity (m/s^2, base frame); coordinates (3 n,).
 
@@ -121,26 +102,20 @@ class Chain:
         imposed = weights * _imposed(walked, shapes, rates, gravity_m_s2)
         pose = [ca.horzcat(*walked.positions), walked.tip_rotation]
         self.n_segments = n_segments
-        # CasADi is column-major: what it calls (6 n, 3 n) is the transpose in C order.
-        self._inputs = [np.zeros(size), np.zeros(size), np.zeros(2 * size)]
-        self._dynamics = [np.zeros((size, 2 * size)), np.zeros(2 * size)]
-        self._pose = [np.zeros((n_segments, 3)), np.zeros((3, 3))]
-        self._compiled_dynamics = _Compiled(
-            [shapes, rates, weights], [jacobian, imposed], self._inputs, self._dynamics
+        self._dynamics = CompiledFunction(
+            "dynamics", [shapes, rates, weights], [jacobian.T, imposed]
         )
-        self._compiled_pose = _Compiled([shapes], pose, self._inputs[:1], self._pose)
+        self._pose = CompiledFunction("pose", [shapes], [part.T for part in pose])
 
     def dynamics(self, shapes: Array, rates: Array, weights: Array) -> tuple[Array, Array]:
         """Return ``S`` (3 n, 6 n) and ``a`` (6 n,); valid until the next call."""
-        self._inputs[0][:], self._inputs[1][:], self._inputs[2][:] = shapes, rates, weights
-        self._compiled_dynamics.run()
-        return self._dynamics[0], self._dynamics[1]
+        weighted_jacobian, acceleration = self._dynamics(shapes, rates, weights)
+        return weighted_jacobian, acceleration
 
     def pose(self, shapes: Array) -> tuple[Array, Array]:
         """Return the lumps' positions (n, 3), the last is the tip, and the tip's rotation (3, 3).
 
         Both in the base frame (m), and valid until the next call.
         """
-        self._inputs[0][:] = shapes
-        self._compiled_pose.run()
-        return self._pose[0], self._pose[1].T
+        positions, transposed = self._pose(shapes)
+        return positions, transposed.T

@@ -1,6 +1,7 @@
 """What the simulated arm is made of: the nominal values, and those drawn for a seed."""
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,11 @@ VARIATION = 0.2
 _NOT_VARIED = frozenset({"segments_per_section", "lowest_mode_hz"})
 
 
+def _parameter(nominal: float, meaning: str) -> Any:
+    """Return a field with its nominal value and what it means."""
+    return field(default=nominal, metadata={"meaning": meaning})
+
+
 @dataclass(frozen=True)
 class SimulatorParameters:
     """The nominal arm. A hysteresis is the width of its loop as a fraction of the range.
@@ -21,21 +27,29 @@ class SimulatorParameters:
     ``axial_stiffness_ratio`` is 1 where ``EI = EA d^2 / 2``, three tubes at the offset d.
     """
 
-    segments_per_section: int = 5
-    mass_per_length_kg_m: float = 1.5
-    plate_mass_kg: float = 0.05
-    gyration_radius_m: float = 0.025
-    axial_stiffness_ratio: float = 1.0
-    lowest_mode_hz: float = 2.2
-    damping_ratio: float = 0.15
-    valve_time_constant_s: float = 0.06
-    valve_delay_s: float = 0.005
-    valve_resolution_pa: float = 500.0
-    valve_hysteresis_fraction: float = 0.01
-    chamber_hysteresis_fraction: float = 0.03
-    creep_fraction: float = 0.03
-    creep_time_constant_s: float = 10.0
-    sensor_noise_pa: float = 200.0
+    segments_per_section: int = _parameter(5, "short arcs a section (not varied)")
+    mass_per_length_kg_m: float = _parameter(1.5, "mass of the body along its length")
+    plate_mass_kg: float = _parameter(0.05, "plate at the end of each section")
+    gyration_radius_m: float = _parameter(0.025, "radius of gyration of every mass")
+    axial_stiffness_ratio: float = _parameter(
+        1.0, "1 where `EI = EA d^2 / 2`: three tubes at the offset d"
+    )
+    lowest_mode_hz: float = _parameter(
+        2.2,
+        "lowest mode of the nominal arm, vented, at rest under its gravity; the stiffness follows "
+        "from it (not varied itself)",
+    )
+    damping_ratio: float = _parameter(0.15, "of the lowest mode")
+    valve_time_constant_s: float = _parameter(0.06, "first-order lag")
+    valve_delay_s: float = _parameter(0.005, "dead time")
+    valve_resolution_pa: float = _parameter(500.0, "step of the setpoint, 5 mbar")
+    valve_hysteresis_fraction: float = _parameter(0.01, "width of the loop, a share of the range")
+    chamber_hysteresis_fraction: float = _parameter(0.03, "width of the loop, a share of the range")
+    creep_fraction: float = _parameter(
+        0.03, "how much a chamber creeps, a share of the lengthening"
+    )
+    creep_time_constant_s: float = _parameter(10.0, "how slowly")
+    sensor_noise_pa: float = _parameter(200.0, "standard deviation, 2 mbar")
 
 
 @dataclass(frozen=True)

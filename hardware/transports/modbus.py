@@ -18,13 +18,22 @@ from pneuarm.controllers.arm.errors import HardwareError
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL + 1)
 
 _CONNECT_TIMEOUT_S = 1.0
+_NO_SUCH_REGISTER = 2
 _EXCEPTIONS = {
     1: "it does not know the function",
-    2: "it has no such register",
+    _NO_SUCH_REGISTER: "it has no such register",
     3: "it does not take the value",
     4: "it has failed inside",
     6: "it is busy",
 }
+
+
+class ModbusRefusal(HardwareError):
+    """The terminal has answered with a Modbus exception, whose number is ``code``."""
+
+    def __init__(self, text: str, code: int) -> None:
+        super().__init__(text)
+        self.code = code
 
 
 class ModbusTerminal:
@@ -74,8 +83,8 @@ class ModbusTerminal:
         """Return a block, as :meth:`read`; where it is not there, ask whether ``wired`` is."""
         try:
             return self.read(*block)
-        except HardwareError as error:
-            if "exception 2" not in str(error):
+        except ModbusRefusal as error:
+            if error.code != _NO_SUCH_REGISTER:
                 raise
             raise HardwareError(f"{error}: does the terminal have {wired}?") from error
 
@@ -107,7 +116,8 @@ class ModbusTerminal:
         if isinstance(answer, ExceptionResponse):
             code = answer.exception_code
             reason = _EXCEPTIONS.get(code, "it gave no known reason")
-            raise HardwareError(f"{self._where} refused {what}: {reason} (Modbus exception {code})")
+            text = f"{self._where} refused {what}: {reason} (Modbus exception {code})"
+            raise ModbusRefusal(text, code)
         return answer
 
     def _lost(self, reason: str) -> HardwareError:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import threading
 import time
 from typing import Protocol
 
@@ -13,7 +14,10 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
+from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.hardware.transports.transport_faults import TransportFaults
+
+LOOPBACK = "127.0.0.1"
 
 _ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _BUSY = 1, 2, 6
 _STEP_S = 0.01
@@ -124,3 +128,62 @@ class ModbusServer:
         else:
             return ExceptionResponse(function, _ILLEGAL_FUNCTION)
         return ExceptionResponse(function, _ILLEGAL_ADDRESS)
+
+
+class ServedTerminal:
+    """A terminal behind Modbus TCP on loopback while the context lasts, on a thread of its own.
+
+    ``port`` 0 takes a free one; it is known once the context is entered.
+    """
+
+    def __init__(self, terminal: EmulatedTerminal, port: int = 0) -> None:
+        self.port = port
+        self._faults = TransportFaults()
+        self._server = ModbusServer(terminal, self._faults)
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._begun = threading.Event()
+        self._failure: OSError | None = None
+
+    def inject(self, words: str) -> bool:
+        """Break the transport; return whether ``words`` are a fault of it."""
+        return self._faults.inject(words, time.monotonic())
+
+    def __enter__(self) -> "ServedTerminal":
+        """Listen; raises ConfigurationError where the port is taken."""
+        self._thread.start()
+        self._begun.wait()
+        if self._failure is not None:
+            self._thread.join()
+            raise ConfigurationError(
+                f"port {self.port}: cannot listen on {LOOPBACK} ({self._failure.strerror}); choose "
+                "another port, or 0 for a free one"
+            )
+        return self
+
+    def __exit__(self, *unused: object) -> None:
+        """Break all connections and listen no more."""
+        self._loop.call_soon_threadsafe(self._task.cancel)
+        self._thread.join(5.0)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        ready: asyncio.Future[int] = self._loop.create_future()
+        ready.add_done_callback(self._listens)
+        self._task = self._loop.create_task(self._server.run(LOOPBACK, self.port, ready))
+        try:
+            self._loop.run_until_complete(self._task)
+        except asyncio.CancelledError:
+            pass
+        except OSError as error:
+            self._failure = error
+        finally:
+            self._begun.set()
+            for task in asyncio.all_tasks(self._loop):
+                task.cancel()
+            self._loop.run_until_complete(asyncio.sleep(0))
+            self._loop.close()
+
+    def _listens(self, ready: "asyncio.Future[int]") -> None:
+        self.port = ready.result()
+        self._begun.set()

@@ -12,11 +12,15 @@ import threading
 import time
 import tty
 from collections import deque
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Protocol
 
 from pneuarm.controllers.arm.errors import HardwareError
-from pneuarm.hardware.transports.serial_faults import SerialFaults
+from pneuarm.hardware.device import Emulation
+from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.emulation.faults import PHYSICAL_WORDS
+from pneuarm.hardware.transports.serial_faults import SERIAL_WORDS, SerialFaults
 
 #: How long one pass waits for bytes at most (s), which is how punctual telemetry is.
 _PASS_S = 0.002
@@ -159,3 +163,19 @@ class PseudoTerminal:
         self._device_end = self._host_end = -1
         self._late.clear()
         self.path.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def emulation_on_a_terminal(
+    emulator: SerialEmulator, arm: EmulatedArm, table: Mapping[str, object]
+) -> Iterator[Emulation]:
+    """Run a serial device while the context lasts; ``table`` holds its keys but the port's."""
+    with PseudoTerminal(emulator, SerialFaults()) as terminal:
+
+        def inject(words: str) -> None:
+            with terminal.lock:
+                if not terminal.faults.inject(words, time.monotonic()):
+                    arm.inject(words)
+
+        whole = {"device": str(terminal.path), **table}
+        yield Emulation(whole, inject, SERIAL_WORDS + PHYSICAL_WORDS)

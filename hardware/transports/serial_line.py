@@ -3,6 +3,7 @@
 The timeouts are the transport's own. The time of the control loop does not come in here.
 """
 
+import os
 import select
 import termios
 import time
@@ -129,9 +130,12 @@ def shown(line: bytes) -> str:
     return repr(line[:60])[1:] + ("..." if len(line) > 60 else "")
 
 
-def _reason(error: Exception) -> str:
-    """Return what the system says, without numbers in front and the device's name behind."""
-    text = (isinstance(error, OSError) and error.strerror) or str(error) or type(error).__name__
-    if text.startswith("device reports readiness"):  # how pyserial says that the cable was pulled
-        return "disconnected"
-    return text.splitlines()[0].rpartition("] ")[2].partition(": '")[0][:100]
+def _reason(error: BaseException) -> str:
+    """Return what the system says, or the library where the system has not said anything."""
+    said: BaseException | None = error
+    while said is not None:  # the library keeps the system's own error behind some of its own
+        number = said.args[0] if isinstance(said, termios.error) else getattr(said, "errno", None)
+        if isinstance(number, int):
+            return os.strerror(number)
+        said = said.__context__
+    return str(error)[:100]

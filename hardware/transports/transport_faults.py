@@ -11,7 +11,6 @@ import threading
 from collections.abc import Callable
 
 from pneuarm.controllers.arm.errors import InvalidInput, PneuarmError
-from pneuarm.hardware.emulation.faults import PHYSICAL_WORDS
 
 TRANSPORT_WORDS = (
     "silence S",
@@ -88,28 +87,17 @@ def _number(words: str, value: str) -> float:
     return number
 
 
-def start_console(
-    physical: Callable[[str], None],
-    transport: TransportFaults,
-    clock_s: Callable[[], float],
-) -> None:
+def start_console(inject: Callable[[str], None], words: tuple[str, ...]) -> None:
     """Take fault words as lines on stdin, on a thread of its own; a wrong one is answered so."""
-
-    def take(line: str) -> None:
-        if not transport.inject(line, clock_s()):
-            physical(line)
 
     def listen() -> None:
         for line in sys.stdin:
             if not line.strip():
                 continue
             try:
-                take(line.strip())
+                inject(line.strip())
                 print(f"fault      {line.strip()}", flush=True)
             except PneuarmError as error:
-                print(f"{error}; or {', '.join(TRANSPORT_WORDS)}", flush=True)
+                print(f"{error}; allowed: {', '.join(words)}", flush=True)
 
     threading.Thread(target=listen, daemon=True).start()
-
-
-ALL_WORDS = TRANSPORT_WORDS + PHYSICAL_WORDS

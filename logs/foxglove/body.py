@@ -12,8 +12,8 @@ from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 
 from pneuarm.controllers.arm.arm import CHAMBER_ANGLES_RAD, Arm, Array
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.controllers.kinematics.constant_curvature import curve_transforms
-from pneuarm.controllers.tasks.tip_pose import rotation_from_quaternion
 from pneuarm.logs.foxglove.frames import BASE, timestamp
 
 _POINT = np.dtype(

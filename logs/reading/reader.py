@@ -1,23 +1,42 @@
-"""Reading a session back: whole or broken off, one part or many."""
+"""Reading a session back: whole, broken off or damaged, one part or many."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import heapq
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from google.protobuf.message import DecodeError, Message
 from mcap.records import Channel
-from mcap.records import Message as McapMessage
-from mcap.well_known import MessageEncoding
 from mcap.writer import MCAP0_MAGIC
 
 from pneuarm.controllers.arm.errors import LogError
-from pneuarm.logs.recording.session import is_finished, parts_of, whole_records
+from pneuarm.logs.reading.parts import parts_of, topic_of
+from pneuarm.logs.reading.walk import (
+    Damage,
+    GoodChunk,
+    GoodRecord,
+    Piece,
+    Stored,
+    data_is_right,
+    read_summary,
+    walk,
+)
+from pneuarm.logs.rings.rings import HOLD_S
 from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
-from pneuarm.logs.schema.topics import LOGGED, STATE, Topic, split_key
+from pneuarm.logs.schema.topics import INFO, STATE, Topic, split_key
 
-_BY_KEY = {topic.key: topic for topic in LOGGED}
+#: A recorder that lags writes events ahead of the ticks of their time, by a ring at most.
+_OUT_OF_ORDER_NS = int(1.2 * HOLD_S * 1e9)
+
+#: What the numbers of a file's channels mean; None for a channel of somebody else.
+Topics = dict[int, Topic | None]
+
+#: Ticks that are decoded at once.
+_BATCH = 1000
 
 
 @dataclass(frozen=True)
@@ -29,97 +48,196 @@ class Entry:
     time_unix_ns: int
 
 
+@dataclass(frozen=True)
+class Raw:
+    """One message of a log as bytes."""
+
+    topic: Topic
+    payload: bytes
+    time_unix_ns: int
+
+
 class LogReader:
-    """Iterates over the messages of a session in the order of the file."""
+    """Reads the messages of a session; what is damaged is left out, and told in ``damage``."""
 
     def __init__(self, path: Path) -> None:
         """Open the session that starts with ``path``; raises LogError if it is not one of ours."""
-        try:
-            with path.open("rb") as file:
-                magic = file.read(len(MCAP0_MAGIC))
-        except OSError as error:
-            raise LogError(f"{path} cannot be read: {error.strerror}") from error
-        if magic != MCAP0_MAGIC:
-            raise LogError(f"{path} is not an MCAP file; a session log ends in .mcap")
         self.parts = parts_of(path)
+        self._damage: dict[Damage, None] = {}
         self.info = self._first_info()
 
     def _first_info(self) -> pb.Info:
-        for entry in self:
-            if isinstance(entry.message, pb.Info):
-                return entry.message
-            break
-        raise LogError(f"{self.parts[0]} is an MCAP file, but not a session log of pneuarm")
+        """Return the facts; of those whose every copy is lost, what the channels know."""
+        arm = ""
+        for part in self.parts:
+            for piece, topics in self.pieces(part):
+                for raw in _ours(piece, topics):
+                    if raw.topic is INFO and (info := _parsed(raw)) is not None:
+                        return cast("pb.Info", info)
+                arm = arm or _arm_of(piece)
+        if not arm:
+            raise LogError(_not_ours(self.parts[0]))
+        self._tell(Damage(self.parts[0], 0, 0, "the facts of the session (its configuration)"))
+        return pb.Info(arm=arm)
 
     @property
     def finished(self) -> bool:
-        """Say whether every part was closed properly."""
-        return all(is_finished(part) for part in self.parts)
+        """Say whether every part was closed properly, with its summary whole."""
+        return all(read_summary(part) is not None for part in self.parts)
+
+    @property
+    def damage(self) -> list[Damage]:
+        """What was damaged, as far as the log has been read until now."""
+        return list(self._damage)
 
     def __iter__(self) -> Iterator[Entry]:
-        """Yield every message of our topics."""
-        for part in self.parts:
-            yield from self._entries(part)
+        """Yield every message of our topics in the order of time."""
+        for raw in _in_time_order(self.raw()):
+            message = self._message(raw)
+            if message is not None:
+                yield Entry(raw.topic, message, raw.time_unix_ns)
 
-    def _entries(self, part: Path) -> Iterator[Entry]:
-        topics: dict[int, Topic] = {}
-        for record in whole_records(part):
-            if isinstance(record, Channel):
-                topic = _BY_KEY.get(split_key(record.topic)[1])
-                if topic is not None and record.message_encoding == MessageEncoding.Protobuf:
-                    topics[record.id] = topic
-            elif isinstance(record, McapMessage) and record.channel_id in topics:
-                topic = topics[record.channel_id]
-                if topic.message is not None:
-                    message = topic.message()
-                    try:
-                        message.ParseFromString(record.data)
-                    except DecodeError as error:
-                        raise LogError(f"{part} is damaged: no message at {topic.key}") from error
-                    yield Entry(topic, message, record.log_time)
+    def _message(self, raw: Raw) -> Message | None:
+        message = _parsed(raw)
+        if message is None:
+            self._tell(Damage(self.parts[0], 0, 0, f"a message at {raw.topic.key} cannot be read"))
+        return message
+
+    def raw(self) -> Iterator[Raw]:
+        """Yield every message of our topics as bytes, in the order of the file."""
+        for part in self.parts:
+            for piece, topics in self.pieces(part):
+                yield from _ours(piece, topics)
+
+    def pieces(self, part: Path) -> Iterator[tuple[Piece, Topics]]:
+        """Yield chunks, records and damage of one part, each with the channels known by then."""
+        summary = read_summary(part)
+        topics: Topics = {}
+        if summary is not None:
+            _learn(topics, summary.channels.values())
+        loose = False
+        for piece in walk(part):
+            if isinstance(piece, Damage):
+                self._tell(piece)
+            elif isinstance(piece, GoodChunk):
+                _learn(topics, piece.named)
+                nameless = sum(message.channel not in topics for message in piece.messages)
+                if nameless:
+                    what = f"{nameless} messages whose channels stood where the damage is"
+                    self._tell(Damage(part, piece.offset, piece.offset + len(piece.raw), what))
+            else:
+                if isinstance(piece.record, Channel):  # which no checksum covers
+                    topics.setdefault(piece.record.id, topic_of(piece.record))
+                if isinstance(piece.record, Stored) and not loose:
+                    loose = True
+                    self._tell_if_unchecked(part, piece.offset)
+            yield piece, topics
+
+    def _tell_if_unchecked(self, part: Path, offset: int) -> None:
+        """Outside of chunks only the checksum of all data covers a message, where there is one."""
+        if not data_is_right(part):
+            what = "messages outside of chunks, without a checksum that is right: unchecked"
+            self._tell(Damage(part, offset, offset, what))
+
+    def _tell(self, damage: Damage) -> None:
+        self._damage.setdefault(damage)
 
     @property
     def n_sections(self) -> int:
         """Number of sections of the arm."""
-        return len(self.info.bend_max_rad)
+        if self.info.bend_max_rad:
+            return len(self.info.bend_max_rad)
+        first = next(self._states(), None)
+        return first.n_sections if first is not None else 1
 
-    def ticks(self) -> np.ndarray:
-        """All ticks as one structured array, in order; see :mod:`pneuarm.logs.rings.tick`."""
-        states = [entry.message for entry in self if isinstance(entry.message, pb.ArmState)]
-        return ticks_from_states(states, self.n_sections)
+    def _states(self) -> Iterator[pb.ArmState]:
+        for raw in self.raw():
+            if raw.topic is STATE:
+                state = self._message(raw)
+                if state is not None:
+                    yield cast("pb.ArmState", state)
+
+    def tick_batches(self) -> Iterator[np.ndarray]:
+        """Yield the ticks in arrays of at most a thousand, in the order of the file."""
+        states, n_sections = self._states(), self.n_sections
+        while batch := list(islice(states, _BATCH)):
+            yield ticks_from_states(batch, n_sections)
+
+    def ticks(self, names: Sequence[str] | None = None) -> np.ndarray:
+        """All ticks as one structured array, in order, each once; see `pneuarm.logs.rings.tick`.
+
+        An hour of a whole tick takes gigabytes: ``names`` are the only fields that are kept.
+        """
+        kept = None if names is None else ["sequence", *(n for n in names if n != "sequence")]
+        batches = [batch if kept is None else _only(batch, kept) for batch in self.tick_batches()]
+        if not batches:
+            empty = ticks_from_states([], self.n_sections)
+            return empty if kept is None else _only(empty, kept)
+        ticks = np.concatenate(batches)
+        numbers = ticks["sequence"]
+        if (numbers[1:] > numbers[:-1]).all():
+            return ticks
+        return ticks[np.unique(numbers, return_index=True)[1]]
 
 
-@dataclass
-class LogSummary:
-    """What `pneuarm info` says of a log."""
-
-    path: str
-    parts: int
-    finished: bool
-    arm: str
-    start_unix_ns: int = 0
-    end_unix_ns: int = 0
-    size_bytes: int = 0
-    ticks: int = 0
-    missing_ticks: int = 0
-    messages: dict[str, int] = field(default_factory=dict)
-    versions: dict[str, str] = field(default_factory=dict)
+def _only(ticks: np.ndarray, names: list[str]) -> np.ndarray:
+    kept = np.zeros(len(ticks), dtype=[(name, ticks.dtype[name]) for name in names])
+    for name in names:
+        kept[name] = ticks[name]
+    return kept
 
 
-def summarise(reader: LogReader) -> LogSummary:
-    """Count what is in a log, and which ticks are missing between its first and last."""
-    summary = LogSummary(str(reader.parts[0]), len(reader.parts), reader.finished, reader.info.arm)
-    summary.versions = dict(reader.info.versions)
-    summary.size_bytes = sum(part.stat().st_size for part in reader.parts)
-    seen: set[int] = set()
-    for entry in reader:
-        key = entry.topic.key
-        summary.messages[key] = summary.messages.get(key, 0) + 1
-        if entry.topic is STATE and isinstance(entry.message, pb.ArmState):
-            seen.add(entry.message.sequence)
-            summary.start_unix_ns = summary.start_unix_ns or entry.time_unix_ns
-            summary.end_unix_ns = max(summary.end_unix_ns, entry.time_unix_ns)
-    summary.ticks = len(seen)
-    # Ticks are numbered from 1, so a log that starts later lacks its beginning too.
-    summary.missing_ticks = max(seen) - len(seen) if seen else 0
-    return summary
+def _learn(topics: Topics, records: Iterable[object]) -> None:
+    topics.update({r.id: topic_of(r) for r in records if isinstance(r, Channel)})
+
+
+def _parsed(raw: Raw) -> Message | None:
+    """Return the message, None where the bytes are none, however right their checksum is."""
+    message = raw.topic.message() if raw.topic.message is not None else None
+    if message is not None:
+        try:
+            message.ParseFromString(raw.payload)
+        except DecodeError:
+            return None
+    return message
+
+
+def _ours(piece: Piece, topics: Topics) -> Iterator[Raw]:
+    messages: Iterable[Stored] = ()
+    if isinstance(piece, GoodChunk):
+        messages = piece.messages
+    elif isinstance(piece, GoodRecord) and isinstance(piece.record, Stored):
+        messages = (piece.record,)
+    for message in messages:
+        topic = topics.get(message.channel)
+        if topic is not None:
+            yield Raw(topic, message.payload, message.time_ns)
+
+
+def _arm_of(piece: Piece) -> str:
+    """Return the arm that a channel of ours names, empty where there is none."""
+    records: Sequence[object] = ()
+    if isinstance(piece, GoodChunk):
+        records = piece.named
+    elif isinstance(piece, GoodRecord):
+        records = (piece.record,)
+    channels = [record for record in records if isinstance(record, Channel)]
+    return next((split_key(c.topic)[0] for c in channels if topic_of(c) is not None), "")
+
+
+def _not_ours(path: Path) -> str:
+    with path.open("rb") as file:
+        if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            return f"{path} is not an MCAP file; a session log ends in .mcap"
+    return f"{path} is an MCAP file, but not a session log of pneuarm, or nothing of it is readable"
+
+
+def _in_time_order(messages: Iterable[Raw]) -> Iterator[Raw]:
+    """Sort what is out of order by some seconds, holding no more than these."""
+    waiting: list[tuple[int, int, Raw]] = []
+    for number, raw in enumerate(messages):
+        heapq.heappush(waiting, (raw.time_unix_ns, number, raw))
+        while waiting[0][0] < raw.time_unix_ns - _OUT_OF_ORDER_NS:
+            yield heapq.heappop(waiting)[2]
+    while waiting:
+        yield heapq.heappop(waiting)[2]

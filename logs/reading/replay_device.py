@@ -10,6 +10,7 @@ from pneuarm.hardware.channels import CallOrder
 from pneuarm.hardware.checked import checked_command
 from pneuarm.hardware.interface import Measurement
 from pneuarm.logs.reading.reader import LogReader
+from pneuarm.logs.reading.replay import HOLE_S
 
 WHAT = "the replayed log"
 
@@ -17,11 +18,9 @@ WHAT = "the replayed log"
 class ReplayDevice:
     """Reads a session's pressures and lengths in their time, counted from the first reading.
 
-    It satisfies :class:`pneuarm.hardware.interface.Hardware`. What is written goes nowhere.
+    It satisfies :class:`pneuarm.hardware.interface.Hardware`. What is written goes nowhere. A hole
+    in the log is skipped: the reading behind it follows the one before.
     """
-
-    #: There is no air behind it.
-    has_watchdog = True
 
     def __init__(self, arm: Arm, path: Path) -> None:
         """Raise ConfigurationError for a log that is none, or of an arm with other sections."""
@@ -52,13 +51,15 @@ class ReplayDevice:
     def connect(self) -> None:
         """Load the log; raises HardwareError where it holds no ticks."""
         try:
-            ticks = self._reader.ticks()
+            ticks = self._reader.ticks(
+                ("time_unix_ns", "pressure_measured_pa", "length_measured_m")
+            )
         except LogError as error:
             raise HardwareError(f"{WHAT} cannot be read: {error}") from error
         if len(ticks) == 0:
             raise HardwareError(f"{WHAT} {self._path} holds no ticks: replay another session")
-        stamps_ns = ticks["time_unix_ns"]
-        self._times_s = (stamps_ns - stamps_ns[0]) * 1e-9
+        steps_s = np.diff(ticks["time_unix_ns"], prepend=ticks["time_unix_ns"][0]) * 1e-9
+        self._times_s = np.cumsum(np.where(steps_s > HOLE_S, 0.0, steps_s))
         self._pressures_pa = ticks["pressure_measured_pa"]
         self._lengths_m = ticks["length_measured_m"]
         self._began_s: float | None = None

@@ -4,14 +4,15 @@ import fcntl
 import os
 from pathlib import Path
 
-from google.protobuf.message import Message
+from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding
-from mcap.writer import CompressionType, Writer
-from mcap_protobuf.schema import register_schema
+from mcap_protobuf.schema import build_file_descriptor_set
 
+from pneuarm.logs.reading.parts import PART, SESSION
+from pneuarm.logs.recording.chunked_file import ChunkedFile
 from pneuarm.logs.schema.topics import Topic, full_key
 
-#: Deflate in pieces of this size, so that no single piece stalls the recorder for long.
+#: Compress in pieces of this size, so that no single piece stalls the recorder for long.
 _CHUNK_BYTES = 256 * 1024
 
 
@@ -39,9 +40,6 @@ class PatientFile:
         """What the disk has not taken yet."""
         return len(self._pending)
 
-    def flush(self) -> None:
-        """Do nothing: :meth:`drain` decides when, and reports failure."""
-
     def drain(self) -> None:
         """Write everything pending; raises OSError, and keeps the rest, if the disk refuses."""
         while self._pending:
@@ -55,19 +53,29 @@ class PatientFile:
             self._fd = -1
 
 
-class Part:
-    """Writes messages of our topics to one MCAP file, channels registered as they come."""
+def schema_of(topic: Topic, number: int) -> Schema:
+    """Describe the messages of a topic; raises ValueError where anything may be sent."""
+    if topic.message is None:
+        raise ValueError(f"{topic.key} has no message type and cannot be logged")
+    return Schema(
+        id=number,
+        name=topic.message.DESCRIPTOR.full_name,
+        encoding=MessageEncoding.Protobuf,
+        data=build_file_descriptor_set(topic.message).SerializeToString(),
+    )
 
-    def __init__(self, path: Path, arm_name: str) -> None:
+
+class Part:
+    """Writes messages of our topics to one MCAP file; every channel says whose part it is."""
+
+    def __init__(self, path: Path, arm_name: str, session: str = "", number: int = 0) -> None:
         self.path = path
+        #: Whether chunks are compressed: what a recorder that lags gives up first.
+        self.compress = True
         self._arm_name = arm_name
+        self._identity = {SESSION: session or path.stem, PART: str(number)}
         self._file = PatientFile(path)
-        self._writer = Writer(
-            self._file,  # type: ignore[arg-type]  # anything with write, tell and flush serves
-            chunk_size=_CHUNK_BYTES,
-            compression=CompressionType.ZSTD,
-        )
-        self._writer.start(profile="", library="pneuarm")
+        self._mcap = ChunkedFile(self._file)
         self._channels: dict[str, int] = {}
 
     def write(self, topic: Topic, payload: bytes, time_unix_ns: int, sequence: int = 0) -> None:
@@ -75,22 +83,26 @@ class Part:
         channel = self._channels.get(topic.key)
         if channel is None:
             channel = self._register(topic)
-        self._writer.add_message(channel, time_unix_ns, payload, time_unix_ns, sequence)
+        self._mcap.add_message(channel, time_unix_ns, payload, sequence)
+        if self._mcap.open_bytes > _CHUNK_BYTES:
+            self._mcap.end_chunk(self.compress)
 
     def _register(self, topic: Topic) -> int:
-        message_type: type[Message] | None = topic.message
-        if message_type is None:
-            raise ValueError(f"{topic.key} has no message type and cannot be logged")
-        schema = register_schema(self._writer, message_type)
-        channel: int = self._writer.register_channel(
-            full_key(self._arm_name, topic.key), MessageEncoding.Protobuf, schema
+        number = len(self._channels) + 1
+        channel = Channel(
+            id=number,
+            topic=full_key(self._arm_name, topic.key),
+            message_encoding=MessageEncoding.Protobuf,
+            metadata=self._identity,
+            schema_id=number,
         )
-        self._channels[topic.key] = channel
-        return channel
+        self._mcap.register(schema_of(topic, number), channel)
+        self._channels[topic.key] = number
+        return number
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Add a metadata record."""
-        self._writer.add_metadata(name, data)
+        self._mcap.add_metadata(name, data)
 
     @property
     def size_bytes(self) -> int:
@@ -104,13 +116,13 @@ class Part:
 
     def flush(self) -> None:
         """Close the chunk in progress and put everything on the disk; raises OSError."""
-        self._writer.flush()
+        self._mcap.end_chunk(self.compress)
         self._file.drain()
 
     def finish(self) -> None:
         """Write index and footer and close; raises OSError, and may be tried again."""
         if not self._finished:
-            self._writer.finish()
+            self._mcap.finish()
             self._finished = True
         self._file.drain()
         self._file.close()

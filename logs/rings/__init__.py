@@ -1,1 +1,1 @@
-"""Shared memory between the processes: the tick records, the messages, the status."""
+"""Shared memory between the processes: ticks, messages, status. A writer never waits."""

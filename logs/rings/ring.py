@@ -93,6 +93,11 @@ class RingReader:
         (sequence,) = _HEAD.unpack_from(self._view, 0)
         return int(sequence)
 
+    @property
+    def behind(self) -> int:
+        """How many records have been written that were not read yet."""
+        return self.head() + 1 - self.next_sequence
+
     def skip_to(self, sequence: int) -> int:
         """Go on with the given record; return how many were skipped, without counting a loss."""
         skipped = max(0, sequence - self.next_sequence)

@@ -6,6 +6,10 @@ from multiprocessing.context import SpawnContext
 from multiprocessing.sharedctypes import RawArray
 from typing import Any
 
+#: Behind by this share of the ring the recorder writes ticks and messages, and nothing that can be
+#: computed from them.
+FAR_BEHIND = 1 / 2
+
 
 class Disk(IntEnum):
     """State of the recording."""
@@ -18,7 +22,10 @@ class Disk(IntEnum):
 
 @dataclass(frozen=True)
 class RecorderStatus:
-    """Written by the recorder alone, read by all; every value is one aligned 64-bit word."""
+    """Written by the recorder alone, read by all; every value is one aligned 64-bit word.
+
+    What is lost is counted over all recorders of a session, however often one was started again.
+    """
 
     words: Any
 
@@ -27,15 +34,24 @@ class RecorderStatus:
         """Make the shared words, all zero."""
         return cls(RawArray("q", 16))
 
-    def publish(self, disk: Disk, free_bytes: int, missed: int) -> None:
-        """Say how the recording stands."""
-        self.words[0], self.words[1], self.words[2] = int(disk), free_bytes, missed
+    def publish(
+        self,
+        disk: Disk,
+        free_bytes: int,
+        missed_ticks: int = 0,
+        missed_messages: int = 0,
+        behind: int = 0,
+    ) -> None:
+        """Say how the recording stands; a recorder's own losses come to those before it."""
+        self.words[0], self.words[1] = int(disk), free_bytes
+        self.words[2], self.words[3] = missed_ticks, missed_messages
+        self.words[15] = behind
 
     def publish_progress(self, next_tick: int, next_messages: list[int], next_part: int) -> None:
         """Say from where a successor would have to go on, once it is on the disk."""
-        self.words[3], self.words[4] = next_tick, next_part
+        self.words[4], self.words[5] = next_tick, next_part
         for index, sequence in enumerate(next_messages):
-            self.words[5 + index] = sequence
+            self.words[6 + index] = sequence
 
     @property
     def disk(self) -> Disk:
@@ -48,16 +64,31 @@ class RecorderStatus:
         return int(self.words[1])
 
     @property
+    def missed_ticks(self) -> int:
+        """Ticks that were overwritten before they were written down."""
+        return int(self.words[2])
+
+    @property
+    def missed_messages(self) -> int:
+        """Records of messages, events among them, that were overwritten."""
+        return int(self.words[3])
+
+    @property
+    def behind(self) -> int:
+        """Ticks that were not yet written down when the recorder last looked."""
+        return int(self.words[15])
+
+    @property
     def missed(self) -> int:
         """Records lost, ticks and messages together."""
-        return int(self.words[2])
+        return self.missed_ticks + self.missed_messages
 
     def progress(self, n_rings: int) -> tuple[int, list[int], int]:
         """Next tick, next message of every ring, next part; 0 where nothing was written yet."""
         return (
-            int(self.words[3]),
-            [max(1, int(self.words[5 + index])) for index in range(n_rings)],
             int(self.words[4]),
+            [max(1, int(self.words[6 + index])) for index in range(n_rings)],
+            int(self.words[5]),
         )
 
 

@@ -1,1 +1,1 @@
-"""Protobuf definitions and the Python generated from them (`make proto`)."""
+"""Messages and keys: the .proto, the Python made of it (`make proto`), and the codec."""

@@ -6,7 +6,7 @@ from google.protobuf import json_format
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.unknown_fields import UnknownFieldSet
 
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected
 
 #: No message of ours comes near this size.
 MAX_PAYLOAD_BYTES = 65536
@@ -28,15 +28,15 @@ def is_json(encoding: str) -> bool:
 
 
 def decode(message_type: type[M], payload: bytes, encoding: str) -> M:
-    """Read a message; raises TargetRejected with one sentence for anything that is not one."""
+    """Read a message; raises MessageRejected with one sentence for anything that is not one."""
     name = message_type.DESCRIPTOR.full_name
     if len(payload) > MAX_PAYLOAD_BYTES:
-        raise TargetRejected(
+        raise MessageRejected(
             f"payload of {len(payload)} bytes; at most {MAX_PAYLOAD_BYTES} are read"
         )
     schema = encoding.partition(";")[2]
     if schema and schema != name:
-        raise TargetRejected(f"message of type {schema!r}; this key takes {name}")
+        raise MessageRejected(f"message of type {schema!r}; this key takes {name}")
     message = message_type()
     try:
         if is_json(encoding):
@@ -48,9 +48,9 @@ def decode(message_type: type[M], payload: bytes, encoding: str) -> M:
         # Half a surrogate pair in JSON cannot be written as UTF-8, so not into an event.
         shown = str(error).encode("utf-8", "backslashreplace").decode()
         detail = shown.splitlines()[0][:200]
-        raise TargetRejected(f"payload is not the {kind} form of {name}: {detail}") from error
+        raise MessageRejected(f"payload is not the {kind} form of {name}: {detail}") from error
     if _has_unknown_fields(message):
-        raise TargetRejected(f"payload has fields that {name} does not have; wrong message type?")
+        raise MessageRejected(f"payload has fields that {name} does not have; wrong message type?")
     return message
 
 
@@ -59,8 +59,8 @@ def _has_unknown_fields(message: Message) -> bool:
         return True
     return any(
         _has_unknown_fields(value)
-        for field, value in message.ListFields()
-        if field.message_type is not None and not field.is_repeated
+        for _, value in message.ListFields()
+        if isinstance(value, Message)  # not the list of a repeated field
     )
 
 

@@ -1,9 +1,9 @@
+from google.protobuf import descriptor_pb2 as _descriptor_pb2
 from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
-from collections.abc import Iterable as _Iterable, Mapping as _Mapping
-from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Mapping, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
@@ -62,6 +62,13 @@ class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     RESET: _ClassVar[Action]
     RELEASE_LEASE: _ClassVar[Action]
 
+class Refusal(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    NOT_REFUSED: _ClassVar[Refusal]
+    BAD_REQUEST: _ClassVar[Refusal]
+    LEASE_REFUSED: _ClassVar[Refusal]
+    MODE_REFUSED: _ClassVar[Refusal]
+
 class Level(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     LEVEL_UNSPECIFIED: _ClassVar[Level]
@@ -105,10 +112,16 @@ HOLD_NOW: Action
 VENT: Action
 RESET: Action
 RELEASE_LEASE: Action
+NOT_REFUSED: Refusal
+BAD_REQUEST: Refusal
+LEASE_REFUSED: Refusal
+MODE_REFUSED: Refusal
 LEVEL_UNSPECIFIED: Level
 INFO: Level
 WARNING: Level
 ERROR: Level
+ELEMENTS_FIELD_NUMBER: _ClassVar[int]
+elements: _descriptor.FieldDescriptor
 
 class Vector3(_message.Message):
     __slots__ = ("x", "y", "z")
@@ -322,23 +335,25 @@ class ModeRequest(_message.Message):
     lease_secret: str
     action: Action
     take_over: bool
-    def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., action: _Optional[_Union[Action, str]] = ..., take_over: _Optional[bool] = ...) -> None: ...
+    def __init__(self, client_id: _Optional[str] = ..., lease_secret: _Optional[str] = ..., action: _Optional[_Union[Action, str]] = ..., take_over: bool = ...) -> None: ...
 
 class Reply(_message.Message):
-    __slots__ = ("accepted", "reason", "mode", "lease_secret", "lease_holder", "state_sequence")
+    __slots__ = ("accepted", "reason", "mode", "lease_secret", "lease_holder", "state_sequence", "refusal")
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
     LEASE_SECRET_FIELD_NUMBER: _ClassVar[int]
     LEASE_HOLDER_FIELD_NUMBER: _ClassVar[int]
     STATE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    REFUSAL_FIELD_NUMBER: _ClassVar[int]
     accepted: bool
     reason: str
     mode: Mode
     lease_secret: str
     lease_holder: str
     state_sequence: int
-    def __init__(self, accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., lease_secret: _Optional[str] = ..., lease_holder: _Optional[str] = ..., state_sequence: _Optional[int] = ...) -> None: ...
+    refusal: Refusal
+    def __init__(self, accepted: bool = ..., reason: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., lease_secret: _Optional[str] = ..., lease_holder: _Optional[str] = ..., state_sequence: _Optional[int] = ..., refusal: _Optional[_Union[Refusal, str]] = ...) -> None: ...
 
 class ArmState(_message.Message):
     __slots__ = ("sequence", "time_unix_ns", "mode", "n_sections", "law", "target_kind", "target_sequence", "target_age_s", "reach", "binding_limits", "target_error_m", "target_position_m", "target_orientation_xyzw", "length_commanded_m", "length_estimated_m", "length_measured_m", "pressure_commanded_pa", "pressure_sent_pa", "pressure_measured_pa", "tip_commanded_position_m", "tip_estimated_position_m", "tip_estimated_orientation_xyzw", "tip_measured_position_m", "tip_measured_orientation_xyzw", "tip_measured_age_s", "tip_true_position_m", "tip_true_orientation_xyzw", "guard_intervention", "guard_interventions", "qp_fallbacks", "wake_latency_s", "compute_s", "overruns", "active_faults", "supply_pa", "measurement_age_s", "guard_range", "guard_slew", "guard_not_finite", "guard_too_old", "guard_supply", "reference_position_m", "reference_velocity_m_s", "reference_error_m", "tip_model_position_m", "tip_offset_m", "tip_offset_orientation_xyzw", "tip_estimated_sigma_m", "tip_estimated_source", "tip_poses_refused")
@@ -445,7 +460,7 @@ class ArmState(_message.Message):
     def __init__(self, sequence: _Optional[int] = ..., time_unix_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., n_sections: _Optional[int] = ..., law: _Optional[_Union[Law, str]] = ..., target_kind: _Optional[_Union[TargetKind, str]] = ..., target_sequence: _Optional[int] = ..., target_age_s: _Optional[float] = ..., reach: _Optional[_Union[Reach, str]] = ..., binding_limits: _Optional[int] = ..., target_error_m: _Optional[float] = ..., target_position_m: _Optional[_Iterable[float]] = ..., target_orientation_xyzw: _Optional[_Iterable[float]] = ..., length_commanded_m: _Optional[_Iterable[float]] = ..., length_estimated_m: _Optional[_Iterable[float]] = ..., length_measured_m: _Optional[_Iterable[float]] = ..., pressure_commanded_pa: _Optional[_Iterable[float]] = ..., pressure_sent_pa: _Optional[_Iterable[float]] = ..., pressure_measured_pa: _Optional[_Iterable[float]] = ..., tip_commanded_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_position_m: _Optional[_Iterable[float]] = ..., tip_estimated_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_position_m: _Optional[_Iterable[float]] = ..., tip_measured_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_measured_age_s: _Optional[float] = ..., tip_true_position_m: _Optional[_Iterable[float]] = ..., tip_true_orientation_xyzw: _Optional[_Iterable[float]] = ..., guard_intervention: _Optional[int] = ..., guard_interventions: _Optional[int] = ..., qp_fallbacks: _Optional[int] = ..., wake_latency_s: _Optional[float] = ..., compute_s: _Optional[float] = ..., overruns: _Optional[int] = ..., active_faults: _Optional[int] = ..., supply_pa: _Optional[float] = ..., measurement_age_s: _Optional[float] = ..., guard_range: _Optional[int] = ..., guard_slew: _Optional[int] = ..., guard_not_finite: _Optional[int] = ..., guard_too_old: _Optional[int] = ..., guard_supply: _Optional[int] = ..., reference_position_m: _Optional[_Iterable[float]] = ..., reference_velocity_m_s: _Optional[_Iterable[float]] = ..., reference_error_m: _Optional[float] = ..., tip_model_position_m: _Optional[_Iterable[float]] = ..., tip_offset_m: _Optional[_Iterable[float]] = ..., tip_offset_orientation_xyzw: _Optional[_Iterable[float]] = ..., tip_estimated_sigma_m: _Optional[float] = ..., tip_estimated_source: _Optional[_Union[EstimateSource, str]] = ..., tip_poses_refused: _Optional[int] = ...) -> None: ...
 
 class Event(_message.Message):
-    __slots__ = ("time_unix_ns", "level", "source", "code", "text", "cause", "remedy", "client_id", "mode", "payload")
+    __slots__ = ("time_unix_ns", "level", "source", "code", "text", "cause", "remedy", "client_id", "mode", "payload", "key", "target_sequence")
     TIME_UNIX_NS_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
@@ -456,6 +471,8 @@ class Event(_message.Message):
     CLIENT_ID_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
     PAYLOAD_FIELD_NUMBER: _ClassVar[int]
+    KEY_FIELD_NUMBER: _ClassVar[int]
+    TARGET_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     time_unix_ns: int
     level: Level
     source: str
@@ -466,7 +483,9 @@ class Event(_message.Message):
     client_id: str
     mode: Mode
     payload: bytes
-    def __init__(self, time_unix_ns: _Optional[int] = ..., level: _Optional[_Union[Level, str]] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., cause: _Optional[str] = ..., remedy: _Optional[str] = ..., client_id: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., payload: _Optional[bytes] = ...) -> None: ...
+    key: str
+    target_sequence: int
+    def __init__(self, time_unix_ns: _Optional[int] = ..., level: _Optional[_Union[Level, str]] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., cause: _Optional[str] = ..., remedy: _Optional[str] = ..., client_id: _Optional[str] = ..., mode: _Optional[_Union[Mode, str]] = ..., payload: _Optional[bytes] = ..., key: _Optional[str] = ..., target_sequence: _Optional[int] = ...) -> None: ...
 
 class ProcessHealth(_message.Message):
     __slots__ = ("name", "pid", "cpu_share", "memory_bytes", "dropped", "restarts")

@@ -17,8 +17,10 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 class Topic:
     """One key under ``pneuarm/<arm>/``.
 
-    ``message`` is None where anything may be sent; ``rate_hz`` is the rate of publication, None
-    for "when it happens"; ``logged_rate_hz`` the rate in the file, None for "every one".
+    ``message`` is None where anything may be sent; ``rate_hz`` is the rate of publication, and
+    ``when`` says in words what a rate does not; ``logged_rate_hz`` is the rate in the file, None
+    for "every one". ``newest`` says that the newest message also answers queries, ``reply`` what
+    a query with a ``message`` is answered by; a query without one is answered by ``message``.
     """
 
     key: str
@@ -27,19 +29,23 @@ class Topic:
     rate_hz: float | None = None
     logged: bool = True
     logged_rate_hz: float | None = None
+    when: str = ""
+    newest: bool = False
+    reply: type[Message] | None = None
 
 
-TARGET = Topic("cmd/target", "in", pb.Target)
-ESTOP = Topic("cmd/estop", "in", None, logged=False)  # the event that follows is logged
-MODE = Topic("cmd/mode", "query", pb.ModeRequest, logged=False)  # its events are logged
-TIP_POSE = Topic("sensor/tip_pose", "in", PoseInFrame)
-STATE = Topic("state", "out", pb.ArmState, rate_hz=100.0)
-TIP = Topic("tip", "out", PoseInFrame, rate_hz=100.0, logged_rate_hz=100.0)
-TF = Topic("tf", "out", FrameTransforms, rate_hz=100.0, logged_rate_hz=100.0)
+TARGET = Topic("cmd/target", "in", pb.Target, when="at least every 200 ms while the arm is to move")
+#: Of the stop and of a change of mode the event that follows is logged.
+ESTOP = Topic("cmd/estop", "in", None, logged=False, when="when needed")
+MODE = Topic("cmd/mode", "query", pb.ModeRequest, reply=pb.Reply, logged=False, when="when needed")
+TIP_POSE = Topic("sensor/tip_pose", "in", PoseInFrame, when="any")
+STATE = Topic("state", "out", pb.ArmState, 100.0, newest=True, when="every tick in the log")
+TIP = Topic("tip", "out", PoseInFrame, 100.0, logged_rate_hz=100.0, newest=True)
+TF = Topic("tf", "out", FrameTransforms, 100.0, logged_rate_hz=100.0, newest=True)
 BODY = Topic("body", "file", PointCloud, logged_rate_hz=20.0)
-HEALTH = Topic("health", "out", pb.Health, rate_hz=1.0)
-EVENT = Topic("event", "out", pb.Event)
-INFO = Topic("info", "query", pb.Info)
+HEALTH = Topic("health", "out", pb.Health, 1.0, newest=True)
+EVENT = Topic("event", "out", pb.Event, when="when it happens")
+INFO = Topic("info", "query", pb.Info, when="when needed")
 
 TOPICS = (TARGET, ESTOP, MODE, TIP_POSE, STATE, TIP, TF, BODY, HEALTH, EVENT, INFO)
 LOGGED = tuple(topic for topic in TOPICS if topic.logged)

@@ -3,9 +3,9 @@
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.limits.limits import names
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 
-_BINDING = {1: "length", 2: "bend", 4: "pressure", 8: "keep-out"}
 _GUARD = {1: "range", 2: "slew", 4: "not finite", 8: "too old", 16: "supply"}
 
 
@@ -16,7 +16,7 @@ def status_markdown(tick: np.void) -> str:
         "Reach": f"{_words(pb.Reach.Name(int(tick['reach'])))}, "
         f"by {_words(pb.Law.Name(int(tick['law'])))}",
         "Tip error, mm": _errors(tick),
-        "Binding limits": _bits(int(tick["binding_limits"]), _BINDING),
+        "Binding limits": ", ".join(names(int(tick["binding_limits"]))) or "none",
         "Guard": f"{_bits(int(tick['guard_intervention']), _GUARD)}, "
         f"{int(tick['guard_interventions'])} interventions so far",
         "Overruns": f"{int(tick['overruns'])} so far",

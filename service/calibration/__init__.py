@@ -1,1 +1,1 @@
-"""`pneuarm calibrate`: the motion, the recording, what is written of it."""
+"""`pneuarm calibrate`: moves the arm, records it, and writes the configuration and its page."""

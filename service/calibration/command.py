@@ -12,6 +12,7 @@ import numpy as np
 from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
 from pneuarm.controllers.calibration.plan import duration_s, plan
 from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.calibration import broken_off
 from pneuarm.service.calibration.drive import Progressed, ask, progress, record, require_tip
 from pneuarm.service.calibration.files import calibrated, require_folder, toml_text, write_whole
@@ -36,6 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Calibrate from a running daemon, or from logs; write the configuration and the page."""
     folder: Path = arguments.out
     require_folder(folder)
+    pyplot()  # for the page: said before the arm moves for nothing
     configuration, recording = (
         read_logs(arguments.from_logs, arguments.arm) if arguments.from_logs else _live(arguments)
     )

@@ -11,11 +11,13 @@ from pneuarm.controllers.arm.arm import Array, Response, Section
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.frames import Frames
-from pneuarm.controllers.geometry.frames import Transform, rotation_vector
+from pneuarm.controllers.geometry.mountings import Transform
+from pneuarm.controllers.geometry.rotations import rotation_vector
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
+from pneuarm.hardware.tables.table import BAR, DEG, MM
 from pneuarm.service.calibration.values import residuals_text, value_text, values, worth_text
 from pneuarm.service.configuration.configuration import Configuration, check
 from pneuarm.service.configuration.tables.frames import FramesConfig
-from pneuarm.service.configuration.tables.table import BAR, DEG, MM
 
 #: Name of a capture system that had none before its frame was found.
 MOCAP_FRAME = "mocap"
@@ -29,8 +31,8 @@ def calibrated(configuration: Configuration, calibration: Calibration) -> Config
     A simulated arm stays what it was: the simulator goes on with the arm from before.
     """
     tables = configuration.model_dump(exclude_none=True)
-    if configuration.hardware.adapter == "simulator" and configuration.simulator.arm is None:
-        tables["simulator"]["arm"] = configuration.arm.model_dump()
+    if configuration.is_simulated and configuration.simulator.arm is None:
+        tables[SIMULATOR.table]["arm"] = configuration.arm.model_dump()
     sections = zip(tables["arm"]["sections"], calibration.arm.sections, strict=True)
     tables["arm"]["sections"] = [old | _section(section) for old, section in sections]
     tables["arm"]["response"] = _response(calibration.arm.response)

@@ -8,8 +8,9 @@ import numpy as np
 
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.excitation import place
+from pneuarm.hardware.tables.table import BAR, MM
+from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.calibration.values import errors_mm
-from pneuarm.service.configuration.tables.table import BAR, MM
 
 _BEFORE, _AFTER, _MEASURED = "#d08a3c", "#1f6fb2", "#222222"
 #: Of the pressure range: a chamber below this counts as not moved.
@@ -44,16 +45,11 @@ def pictures(calibration: Calibration) -> dict[str, bytes]:
 def _picture(
     draw: Callable[[Any, Calibration], None], calibration: Calibration, size: tuple[float, float]
 ) -> bytes:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure = pyplot.figure(figsize=size, dpi=110, layout="constrained")
+    figure = pyplot().figure(figsize=size, dpi=110, layout="constrained")
     draw(figure, calibration)
     png = BytesIO()
     figure.savefig(png, format="png")
-    pyplot.close(figure)
+    pyplot().close(figure)
     return png.getvalue()
 
 

@@ -9,9 +9,18 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import CalibrationError, ConfigurationError, LogError
 from pneuarm.controllers.calibration.recording import Recording, fresh_tips, joined
-from pneuarm.controllers.tasks.tip_pose import rotation_from_quaternion
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.service.configuration.configuration import Configuration, check
+
+#: What is needed of a tick; all of them, of hours, would fill the memory.
+_NEEDED = (
+    "time_unix_ns",
+    "pressure_sent_pa",
+    "pressure_measured_pa",
+    "tip_measured_position_m",
+    "tip_measured_age_s",
+)
 
 #: Samples are this far apart, as on the wire.
 SAMPLE_S = 0.01
@@ -51,7 +60,7 @@ def read_logs(paths: Sequence[Path], name: str | None) -> tuple[Configuration, R
         _require_same(path, configuration.build_arm(), first, name)
     recordings = []
     for path, reader in zip(paths, readers, strict=True):
-        ticks = reader.ticks()
+        ticks = reader.ticks(_NEEDED)
         if not len(ticks) or not np.isfinite(ticks["tip_measured_position_m"]).any():
             raise LogError(
                 f"{path} holds no measured tip pose: a calibration needs motion capture that "

@@ -14,9 +14,8 @@ from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.calibrate import calibrate
 from pneuarm.controllers.calibration.plan import Move, duration_s, plan
 from pneuarm.controllers.calibration.recording import Recording, settled
-from pneuarm.controllers.geometry.frames import rotation_from_vector
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion, rotation_from_vector
 from pneuarm.controllers.targets.targets import PressuresTarget
-from pneuarm.controllers.tasks.tip_pose import rotation_from_quaternion
 from pneuarm.hardware.interface import Hardware
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype
@@ -64,7 +63,7 @@ class _Run:
         self.ticks += 1
         given: list[Command] = [Heartbeat(operator=True), *commands]
         record, _ = self._loop.tick(self.now_ns, given, Disk.OK, Timing())
-        newest: np.void = np.frombuffer(bytes(record), self._dtype)[0]
+        newest: np.void = np.frombuffer(record, self._dtype)[0]
         return newest
 
     def activate(self) -> None:

@@ -8,7 +8,7 @@ from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.fit import SEEN_SHARE
 from pneuarm.controllers.calibration.parameters import COUPLINGS, NAMES, span_pa, values_of
-from pneuarm.service.configuration.tables.table import BAR, DEG, MM
+from pneuarm.hardware.tables.table import BAR, DEG, MM
 
 #: Key of the configuration, field of a Section, unit, one of it in SI.
 _KEYS = (

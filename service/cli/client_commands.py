@@ -118,7 +118,7 @@ def estop(arguments: argparse.Namespace) -> int:
         try:
             with _connect(arguments) as client:
                 client.estop()
-        except DaemonUnreachable as error:
+        except (DaemonUnreachable, NotConfirmed) as error:
             raise NotConfirmed(
                 f"NOT CONFIRMED: {local_error}; {error}; cut the air supply"
             ) from error

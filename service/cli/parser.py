@@ -5,7 +5,7 @@ import importlib
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from pneuarm.controllers.arm.errors import PneuarmError
 
@@ -14,8 +14,6 @@ Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 PRESETS = ("paper", "table1", "trunk")
 
-#: Devices that `emulate` knows; the modules are in service/emulators/command.py.
-EMULATED = ("festo-cpx", "festo-vtem", "ctrl-p", "esp32")
 _ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -24,6 +22,20 @@ def _call(where: str, arguments: argparse.Namespace) -> int:
     module, _, name = where.partition(":")
     function: Command = getattr(importlib.import_module(module), name)
     return function(arguments)
+
+
+def _complete_when_used(
+    parser: argparse.ArgumentParser, complete: Callable[[argparse.ArgumentParser], None]
+) -> None:
+    """Add what the installed devices need once it is parsed: other commands do not wait for it."""
+    plain = parser.parse_known_args
+
+    def parse(args: Any = None, namespace: Any = None) -> Any:
+        parser.parse_known_args = plain  # type: ignore[method-assign]
+        complete(parser)
+        return plain(args, namespace)
+
+    parser.parse_known_args = parse  # type: ignore[method-assign]
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -76,7 +88,7 @@ def _add_daemon(commands: Subparsers) -> None:
         "Daemon and client as processes: circle, eight, ...",
     )
     demo.add_argument("--seconds", type=float, default=30.0, help="length of the show (default 30)")
-    demo.add_argument("--adapter", choices=("simulator", *EMULATED), default="simulator")
+    _complete_when_used(demo, _add_adapter)
     demo.add_argument("--arm", choices=PRESETS, default="paper")
     demo.add_argument("--seed", type=int, default=0, help="seed of the simulated arm")
     demo.add_argument("--json", action="store_true", help="one JSON object instead of the table")
@@ -86,26 +98,32 @@ def _add_emulate(commands: Subparsers) -> None:
     help_text = "A device without the device, for tests."
     emulate = commands.add_parser("emulate", help=help_text, description=help_text)
     devices = emulate.add_subparsers(dest="what", required=True, metavar="DEVICE")
-    for name in EMULATED:
-        _add_emulated_device(devices, name)
+    _complete_when_used(emulate, lambda _: _add_emulated_devices(devices))
     _add_emulated_camera(devices)
 
 
-def _add_emulated_device(devices: Subparsers, name: str) -> None:
-    device = _command(
-        devices,
-        name,
-        "pneuarm.service.emulators.command:emulate",
-        f"{name}, with the simulated arm behind it.",
-    )
-    device.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
-    device.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
-    device.add_argument("--record", type=Path, metavar="FILE", help="what reaches it, JSON lines")
-    if not name.startswith("festo"):
-        return
-    device.add_argument("--port", type=int, default=0, help="TCP port (default: a free one)")
-    device.add_argument("--watchdog-ms", type=int, help="its own watchdog at power-on")
-    device.add_argument("--fail-safe", choices=("reset", "hold"), default="reset")
+def _add_emulated_devices(commands: Subparsers) -> None:
+    from pneuarm.service.configuration.devices import emulated_devices
+
+    for device in emulated_devices():
+        parser = _command(
+            commands,
+            device.name,
+            "pneuarm.service.emulators.command:emulate",
+            f"{device.summary}, with the simulated arm behind it.",
+        )
+        parser.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
+        parser.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
+        parser.add_argument("--record", type=Path, metavar="FILE", help="what reaches it: JSON")
+        device.add_arguments(parser)
+
+
+def _add_adapter(demo: argparse.ArgumentParser) -> None:
+    from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
+    from pneuarm.service.configuration.devices import emulated_devices
+
+    names = (SIMULATOR.name, *(device.name for device in emulated_devices()))
+    demo.add_argument("--adapter", choices=names, default=SIMULATOR.name)
 
 
 def _add_emulated_camera(devices: Subparsers) -> None:

@@ -1,25 +1,26 @@
 """States for people: millimetres, degrees and bar."""
 
 import math
+from collections.abc import Iterable
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 
-_LIMITS = ((1, "length, Eq. (4)"), (2, "bend"), (4, "pressure"), (8, "keep-out"))
 
-
-def millimetres(values_m: "list[float] | object") -> str:
+def millimetres(values_m: Iterable[float]) -> str:
     """Format metres as millimetres."""
-    return "(" + ", ".join(f"{1e3 * value:.1f}" for value in values_m) + ")"  # type: ignore
+    return "(" + ", ".join(f"{1e3 * value:.1f}" for value in values_m) + ")"
 
 
-def bars(values_pa: "list[float] | object") -> str:
+def bars(values_pa: Iterable[float]) -> str:
     """Format pascal as bar."""
-    return "(" + ", ".join(f"{1e-5 * value:+.3f}" for value in values_pa) + ")"  # type: ignore
+    return "(" + ", ".join(f"{1e-5 * value:+.3f}" for value in values_pa) + ")"
 
 
 def binding(flags: int) -> str:
     """Names of the limits that bind."""
-    return " and ".join(name for bit, name in _LIMITS if flags & bit) or "no limit"
+    from pneuarm.controllers.limits.limits import names  # CasADi with it: only where it is needed
+
+    return " and ".join(names(flags)) or "no limit"
 
 
 def state_line(state: pb.ArmState) -> str:

@@ -1,1 +1,1 @@
-"""The user's own program: the client and the targets it sends."""
+"""The user's own program: the client and its targets. No solver, no Rerun, no MCAP."""

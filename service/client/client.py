@@ -18,7 +18,9 @@ from google.protobuf.message import DecodeError, Message
 from pneuarm.controllers.arm.errors import (
     DaemonUnreachable,
     LeaseRefused,
+    MessageRejected,
     ModeRefused,
+    MoveTimeout,
     NotConfirmed,
     PneuarmError,
     TargetRejected,
@@ -52,6 +54,11 @@ _URGENT: dict[str, Any] = {
     "priority": zenoh.Priority.REAL_TIME,
     "congestion_control": zenoh.CongestionControl.BLOCK,
     "express": True,
+}
+
+_REFUSALS: dict[int, type[PneuarmError]] = {
+    pb.BAD_REQUEST: MessageRejected,
+    pb.LEASE_REFUSED: LeaseRefused,
 }
 
 M = TypeVar("M", bound=Message)
@@ -169,7 +176,7 @@ class Client:
         """Return the events since the last call."""
         found = []
         while (sample := self._events.try_recv()) is not None:
-            with contextlib.suppress(TargetRejected):  # no event: not the daemon's
+            with contextlib.suppress(MessageRejected):  # no event: not the daemon's
                 found.append(decode(pb.Event, sample.payload.to_bytes(), str(sample.encoding)))
         return found
 
@@ -202,8 +209,7 @@ class Client:
         if reply.lease_secret:
             self._secret = reply.lease_secret
         if not reply.accepted:
-            held_by_other = reply.lease_holder not in ("", self.client_id)
-            raise (LeaseRefused if held_by_other else ModeRefused)(reply.reason)
+            raise _REFUSALS.get(reply.refusal, ModeRefused)(reply.reason)
         self._wait_for(reply.state_sequence)
         return reply
 
@@ -316,8 +322,7 @@ class Client:
         """Refresh a target until the arm has reached it, and return the state that says so.
 
         A target out of reach ends the wait too: the state's ``reach`` tells, ``binding_limits``
-        why. Raises TargetRejected, ModeRefused when the arm stops following, or NotConfirmed
-        after the timeout.
+        why. Raises TargetRejected, ModeRefused when the arm stops following, or MoveTimeout.
         """
         self.events()
         first = self.send(target)
@@ -332,7 +337,9 @@ class Client:
             if state.target_sequence >= first and state.reach in (pb.REACHED, pb.OUT_OF_REACH):
                 return state
             self.send(target)
-        raise NotConfirmed(f"not reached within {timeout_s:g} s")
+        raise MoveTimeout(
+            f"not reached within {timeout_s:g} s; the arm holds on its way there: give it longer"
+        )
 
     def raise_if_refused(self, first: int = 0) -> None:
         """Raise TargetRejected if the daemon has refused a target of this client's.
@@ -340,20 +347,7 @@ class Client:
         Targets before number ``first`` do not count: their refusals may come late.
         """
         for event in self.events():
-            ours = event.code == "rejected" and event.client_id == self.client_id
             # A refused request was raised by its own call; its event may come after that.
-            if not ours or not event.text.startswith(TARGET.key):
-                continue
-            if self._number_of(event.payload) >= first:
+            ours = event.client_id == self.client_id and event.key == TARGET.key
+            if ours and event.code == "rejected" and event.target_sequence >= first:
                 raise TargetRejected(event.text)
-
-    def _number_of(self, payload: bytes) -> int:
-        """Sequence number of a target of this client's, of which only the beginning is there."""
-        head = pb.Target(client_id=self.client_id, lease_secret=self._secret)
-        number = shift = 0
-        for byte in payload[head.ByteSize() + 1 :]:  # after the field's tag: a varint
-            number |= (byte & 0x7F) << shift
-            shift += 7
-            if byte < 0x80:
-                break
-        return number

@@ -1,1 +1,1 @@
-"""TOML to a checked, frozen configuration, and the built-in arms."""
+"""TOML to a checked, frozen configuration: its tables, and the built-in arms. SI from here on."""

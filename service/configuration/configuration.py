@@ -11,33 +11,39 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
 import tomli_w
 from platformdirs import user_state_path
-from pydantic import BaseModel, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, create_model, model_validator
 
-from pneuarm.controllers.arm.arm import Arm, uncalibrated
+from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
-from pneuarm.controllers.limits.consistency import refuse_contradictions
-from pneuarm.service.configuration.tables.arm import ArmConfig
+from pneuarm.controllers.limits.limits import refuse_contradictions
+from pneuarm.hardware.device import Device
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
+from pneuarm.hardware.simulator.device import SimulatorConfig, simulated_arm
+from pneuarm.hardware.tables.arm import ArmConfig
+from pneuarm.hardware.tables.table import Table
+from pneuarm.service.configuration.devices import AnyDevice, devices
 from pneuarm.service.configuration.tables.control import ControlConfig
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig, ReferenceConfig
-from pneuarm.service.configuration.tables.festo import FestoCpxConfig, FestoVtemConfig
 from pneuarm.service.configuration.tables.frames import FramesConfig
-from pneuarm.service.configuration.tables.hardware import HardwareConfig, SimulatorConfig
+from pneuarm.service.configuration.tables.hardware import HardwareConfig
 from pneuarm.service.configuration.tables.monitors import MonitorsConfig
 from pneuarm.service.configuration.tables.outputs import LogConfig, RerunConfig, ZenohConfig
-from pneuarm.service.configuration.tables.serial import CtrlPConfig, Esp32Config, ReplayConfig
-from pneuarm.service.configuration.tables.table import Table
 
 PRESETS = ("paper", "table1", "trunk")
 
+DeviceConfig = TypeVar("DeviceConfig", bound=Table)
 
-class Configuration(Table):
-    """Everything the daemon is told."""
 
-    preset: Literal["paper", "table1", "trunk"] = "paper"
+class _Configuration(Table):
+    """Everything the daemon is told, but for the tables of the devices."""
+
+    preset: Annotated[
+        Literal["paper", "table1", "trunk"], Field(description="built-in arm below this file")
+    ] = "paper"
     arm: ArmConfig
     control: ControlConfig = ControlConfig()
     reference: ReferenceConfig = ReferenceConfig()
@@ -46,17 +52,12 @@ class Configuration(Table):
     hardware: HardwareConfig = HardwareConfig()
     monitors: MonitorsConfig = MonitorsConfig()
     simulator: SimulatorConfig = SimulatorConfig()
-    festo_cpx: FestoCpxConfig = FestoCpxConfig()
-    festo_vtem: FestoVtemConfig = FestoVtemConfig()
-    ctrl_p: CtrlPConfig = CtrlPConfig()
-    esp32: Esp32Config = Esp32Config()
-    replay: ReplayConfig = ReplayConfig()
     zenoh: ZenohConfig = ZenohConfig()
     rerun: RerunConfig = RerunConfig()
     log: LogConfig = LogConfig()
 
     @model_validator(mode="after")
-    def _simulated_as_controlled(self) -> "Configuration":
+    def _simulated_as_controlled(self) -> "_Configuration":
         there, here = len((self.simulator.arm or self.arm).sections), len(self.arm.sections)
         if there != here:
             raise ValueError(
@@ -69,22 +70,55 @@ class Configuration(Table):
         return replace(self.arm.build(), tool_m=self.frames.tool_m())
 
     def build_simulated_arm(self) -> Arm:
-        """Return the arm that the simulator makes real: ``arm`` where nothing else is said.
-
-        Its body has weight, stiffness and hysteresis of its own: those of a calibration are left
-        out.
-        """
-        arm = (self.simulator.arm or self.arm).build()
-        return replace(arm, sections=tuple(uncalibrated(section) for section in arm.sections))
+        """Return the arm behind the simulator and every emulator: ``arm``, or ``simulator.arm``."""
+        return simulated_arm(self.simulator, self.arm.build())
 
     @property
-    def device_address(self) -> str:
-        """What the lock is on: one daemon a device, whatever the arm is called."""
-        return f"{self.hardware.adapter}:{self.hardware.device or self.arm.name}"
+    def device(self) -> AnyDevice:
+        """The kind of device that moves the air."""
+        return devices().named(self.hardware.adapter)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the arm itself is calculated here, so that its true tip is known."""
+        return self.device is SIMULATOR
+
+    def of_device(self, device: Device[DeviceConfig]) -> DeviceConfig:
+        """Return the table of a kind of device, whether it is used or not."""
+        table: DeviceConfig = getattr(self, device.table)
+        return table
 
     def to_toml(self) -> str:
-        """Return the effective configuration as a file that gives it again."""
-        return tomli_w.dumps(self.model_dump(mode="python", exclude_none=True))
+        """Return the effective configuration as a file that gives it again.
+
+        Of the devices' tables it holds that of the device in use, and those that say something.
+        """
+        idle = {
+            device.table
+            for device in devices().usable.values()
+            if device is not self.device and self.of_device(device) == device.config()
+        }
+        return tomli_w.dumps(self.model_dump(mode="python", exclude_none=True, exclude=idle))
+
+
+# The simulated arm stands behind every emulator, so its table is one of ours.
+devices().set_aside({*_Configuration.model_fields, *dir(_Configuration)} - {SIMULATOR.table})
+
+if TYPE_CHECKING:
+    Configuration = _Configuration
+else:
+    #: Everything the daemon is told: a table for every kind of device too.
+    Configuration = create_model(
+        "Configuration",
+        __base__=_Configuration,
+        __doc__="Everything the daemon is told.",
+        __module__=__name__,
+        **{
+            device.table: (device.config, Field(device.config(), description=device.summary))
+            for device in devices().usable.values()
+            if device is not SIMULATOR
+        },
+    )
 
 
 def log_directory(configuration: Configuration) -> Path:
@@ -152,6 +186,9 @@ def _sentence(item: Any) -> str:
     steps = [f"[{step}]" if isinstance(step, int) else f".{step}" for step in item["loc"]]
     key = "".join(steps).lstrip(".") or "file"
     if item["type"] == "extra_forbidden":
+        for broken in devices().broken.values():
+            if item["loc"] == (broken.name.replace("-", "_"),):
+                return f"{key}: {broken}"
         return f"{key}: no such key; allowed here: {', '.join(_keys_beside(item['loc']))}"
     if item["type"] == "missing":
         return f"{key} is missing"

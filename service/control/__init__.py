@@ -1,1 +1,1 @@
-"""The control process: the tick, its deadlines, its steering."""
+"""The control process: the tick, its deadlines, its steering. Waits for nobody, loads no Zenoh."""

@@ -17,7 +17,7 @@ from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.control.clock import Clock
 from pneuarm.service.control.loop import Loop, LoopSettings, Timing
 from pneuarm.service.devices import registry as backends
-from pneuarm.service.modes.mode_keeper import Timeouts
+from pneuarm.service.modes.mode_keeper import Notice, Timeouts
 from pneuarm.service.processes import realtime
 from pneuarm.service.processes.device_slots import LinkedDevice
 from pneuarm.service.processes.pipe import Command, ModeReply, Pipe, Shutdown
@@ -80,7 +80,7 @@ class ControlProcess:
             self._loop.start_at(time.monotonic_ns())
             self._loop.warm_up()
         except HardwareError as error:
-            self._loop.announce(pb.ERROR, START_FAILED, str(error))
+            self._loop.announce(Notice(pb.ERROR, START_FAILED, str(error)))
             raise SystemExit(1) from error
 
     def _cycle(self, clock: Clock) -> None:
@@ -139,9 +139,8 @@ class ControlProcess:
         text = f"priority {priority} granted" if granted else "priority not granted"
         memory = "memory locked" if locked else "memory not locked"
         self._loop.start_at(time.monotonic_ns())
-        self._loop.announce(
-            pb.INFO if granted else pb.WARNING, REALTIME, f"real-time {text}, {memory}"
-        )
+        level = pb.INFO if granted else pb.WARNING
+        self._loop.announce(Notice(level, REALTIME, f"real-time {text}, {memory}"))
 
 
 def main(

@@ -1,78 +1,76 @@
-"""Everything between a target and the pressures of a tick: reference, correction, law, dither."""
+"""Everything between a target and the setpoints of a tick: reference, correction, law, estimate.
+
+What is to be told is returned as a :class:`Notice`; whoever calls tells it.
+"""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from pneuarm.controllers.actuation.dither import Dither
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.actuation.valve_lead import ValveLead
 from pneuarm.controllers.arm.arm import Arm, Array
-from pneuarm.controllers.feedback.estimator import TipEstimate
+from pneuarm.controllers.controller import Controller
+from pneuarm.controllers.feedback.estimator import Estimator
 from pneuarm.controllers.feedback.notch import Notch
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
-from pneuarm.controllers.laws.controller import Controller
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
+from pneuarm.controllers.laws.settings import ControlSettings
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.reference.follower import Follower, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.controllers.targets.targets import (
-    PoseTarget,
-    PositionTarget,
-    PressuresTarget,
-    ShapeTarget,
-    Target,
-)
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
+from pneuarm.controllers.targets.targets import ShapeTarget, Target
+from pneuarm.hardware.interface import Measurement
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.control.record import Estimate, Steered
+from pneuarm.service.control.setpoints import Setpoints
+from pneuarm.service.modes.mode_keeper import Notice
 from pneuarm.service.processes.pipe import SetTarget, SetTipPose
 
-Tell = Callable[["pb.Level", str, str, str, str], None]
-
-_NONE = np.full(3, np.nan)
-
-#: The dither grows from nothing, and a share of the hysteresis or the lead from 0 to 1, in this
-#: time (s).
-_RAMP_S = 0.3
-
-#: A reference as fast as this (m/s) moves the arm through its hysteresis by itself.
-_MOVING_M_S = 0.06
+#: What may happen in every tick is told this often at most.
+_TELL_EVERY_S = 10.0
 
 
 class Steering:
-    """One arm's reference, observer and controller.
-
-    ``tell`` takes level, code, text, cause and remedy of an event.
-    """
+    """One arm's reference, observer, controller and setpoints."""
 
     def __init__(
         self,
         arm: Arm,
-        controller: Controller,
+        control: ControlSettings,
         reference: ReferenceLimits,
         feedback: FeedbackSettings,
         period_s: float,
-        tell: Tell,
     ) -> None:
-        self._controller, self._feedback, self._tell = controller, feedback, tell
-        gain = controller.settings.gain_per_s
-        self._valves = ValveLead(arm.response.lag_s)
-        quick = replace(arm, response=replace(arm.response, lag_s=self._valves.remaining_s))
-        self._follower = Follower(reference, lead_of(quick.response), gain, period_s)
-        self.observer = TipObserver(quick, feedback, period_s)
+        self._controller, self._feedback = Controller(arm, control), feedback
+        valves = ValveLead(arm.response.lag_s)
+        quick = replace(arm, response=replace(arm.response, lag_s=valves.remaining_s))
+        gain_per_s = control.gain_per_s
+        self._follower = Follower(reference, lead_of(quick.response), gain_per_s, period_s)
+        self._observer = TipObserver(quick, feedback, period_s)
         self._notch = Notch(arm.response)
-        self._dither = Dither(feedback.dither_pa, feedback.dither_period_s)
+        self._estimator = Estimator(arm)
+        self._setpoints = Setpoints(arm, feedback, valves)
         self._vented_m = PressureMap(arm).lengths_m(np.zeros((arm.n_sections, 3)))
         self.tip_m = self._tip_before_m = np.zeros(3)
         self._target: Target | None = None
-        self._seen = self._refusing = False
+        self._camera_seen = self._refusing = self._near_reference = False
         self._told_error = ""
-        self._near = False
-        self._share = self._lead_share = 1.0
-        self._dither_since_s: float | None = None
+        self._told_fallbacks, self._tell_again_s = 0, 0.0
         self._dt_s = period_s
 
-    def set_target(self, command: SetTarget) -> None:
+    @property
+    def held_pa(self) -> Array:
+        """Pressures (n_sections, 3) that a hold keeps."""
+        return self._setpoints.held_pa
+
+    def warm_up(self) -> None:
+        """Run once what a tick may run later for the first time."""
+        self._controller.warm_up()
+        self._controller.binding()
+
+    def set_target(self, command: SetTarget) -> Notice | None:
         """Take a target; the reference goes on from where it is."""
         target, controller = command.target, self._controller
         velocity = (self.tip_m - self._tip_before_m) / self._dt_s
@@ -80,15 +78,16 @@ class Steering:
         self._target = target
         if not self._follower.follows:
             controller.set_target(target)
-        if self._follower.error and self._follower.error != self._told_error:
-            self._tell(
-                pb.WARNING,
-                "reference_error",
-                "the new target was not taken; the reference goes on to the one before",
-                self._follower.error,
-                "send another target",
-            )
-        self._told_error = self._follower.error
+        told, self._told_error = self._told_error, self._follower.error
+        if self._told_error in ("", told):
+            return None
+        return Notice(
+            pb.WARNING,
+            "reference_error",
+            "the new target was not taken; the reference goes on to the one before",
+            self._told_error,
+            "send another target",
+        )
 
     def stop(self) -> None:
         """Follow nothing any more."""
@@ -96,29 +95,28 @@ class Steering:
         self._target = None
         self._controller.set_target(None)
 
-    def start_from(self, pressures_pa: Array) -> None:
-        """Take the commanded lengths from pressures, without a target.
+    def start(self, measured_pa: Array | None) -> None:
+        """Take the commanded lengths from measured pressures, without a target.
 
-        The whole hysteresis is inverted from here on: a share that went up only afterwards would
-        move an arm to which nobody has said anything yet.
+        None goes on from the pressures that are held.
         """
-        self._share = 1.0
-        self._controller.set_hysteresis_share(1.0)
-        self._controller.start_from(pressures_pa)
+        self._setpoints.start(measured_pa)
+        self._controller.set_hysteresis_share(self._setpoints.hysteresis_share)
+        self._controller.start_from(self.held_pa)
         self._follower.forget()
-        self._valves.forget()
         self._target = None
-        self._notch.restart(self.observer.offset_m)
-        self._controller.set_correction(self.observer.offset_m, self.observer.rotation)
+        self._notch.restart(self._observer.offset_m)
+        self._controller.set_correction(self._observer.offset_m, self._observer.rotation)
         self.tip_m = self._tip_before_m = self._controller.tip().position_m
 
-    def measure(self, pose: SetTipPose, now_ns: int) -> None:
+    def measure(self, pose: SetTipPose, now_ns: int) -> Notice | None:
         """Take a measured tip pose, or say once why not."""
         rotation = rotation_from_quaternion(pose.quaternion_xyzw)
         waited_s = (now_ns - pose.received_ns) * 1e-9
-        verdict = self.observer.measure(pose.position_m, rotation, waited_s)
-        if verdict is Verdict.REFUSED and not self._refusing:
-            self._tell(
+        verdict = self._observer.measure(pose.position_m, rotation, waited_s)
+        refused_before, self._refusing = self._refusing, verdict is Verdict.REFUSED
+        if self._refusing and not refused_before:
+            return Notice(
                 pb.WARNING,
                 "tip_pose_refused",
                 "measured tip poses are refused: they jumped by more than "
@@ -126,112 +124,99 @@ class Steering:
                 "a wrong or exchanged marker, or the arm was moved",
                 f"if they stay there for {self._feedback.jump_accept_s:g} s they are taken",
             )
-        elif verdict is Verdict.ACCEPTED_ANEW:
-            self._tell(
-                pb.INFO, "tip_pose_accepted", "the tip poses after the jump are taken", "", ""
-            )
-        self._refusing = verdict is Verdict.REFUSED
+        if verdict is Verdict.ACCEPTED_ANEW:
+            return Notice(pb.INFO, "tip_pose_accepted", "the tip poses after the jump are taken")
+        return None
 
-    def step(self, dt_s: float) -> Array:
-        """One tick of an active arm; returns gauge pressures (n_sections, 3) without the dither."""
+    def step(self, dt_s: float, now_s: float) -> Array:
+        """One tick of an active arm; returns the setpoints (n_sections, 3), gauge pressures."""
         self._dt_s = dt_s or self._dt_s
         self._tip_before_m = self.tip_m
-        offset_m = self._notch.step(self.observer.offset_m, dt_s)
-        self._controller.set_correction(offset_m, self.observer.rotation)
+        offset_m = self._notch.step(self._observer.offset_m, dt_s)
+        self._controller.set_correction(offset_m, self._observer.rotation)
         wanted = self._follower.step(dt_s) if dt_s > 0.0 else None
         if wanted is not None:
-            awaited = self.observer.seen and self._feedback.enabled and not self._near
+            awaited = self._corrected and not self._near_reference
             self._controller.set_target(wanted, not self._follower.arrived, awaited)
         self.tip_m = self._controller.step(dt_s).position_m
-        return self._controller.pressures_pa()
+        setpoints_pa = self._setpoints.step(
+            self._controller.pressures_pa(),
+            dt_s,
+            now_s,
+            self._target is not None and self._target.sends_pressures,
+            self._follower.motion,
+            self._corrected,
+        )
+        self._controller.set_hysteresis_share(self._setpoints.hysteresis_share)
+        return setpoints_pa
 
-    def sent_pa(self, wanted_pa: Array, dt_s: float, now_s: float) -> Array:
-        """Setpoints for the valves, ahead of the wanted pressures, with the dither.
+    @property
+    def _corrected(self) -> bool:
+        return self._observer.seen and self._feedback.enabled
 
-        Pressures that are asked for are sent as they are: a lead that overshoots in the end would
-        cross the play that a calibration wants to see.
-        """
-        wanted = 0.0 if isinstance(self._target, PressuresTarget) else 1.0
-        largest = dt_s / _RAMP_S
-        self._lead_share += min(max(wanted - self._lead_share, -largest), largest)
-        return self._valves.sent_pa(wanted_pa, dt_s, self._lead_share) + self._dither_pa(now_s)
+    def fallback_notice(self, now_s: float) -> Notice | None:
+        """Tell that the QP gave nothing and the damped law went on, once in a while."""
+        count = self._controller.fallbacks
+        if count <= self._told_fallbacks or now_s < self._tell_again_s:
+            return None
+        self._told_fallbacks, self._tell_again_s = count, now_s + _TELL_EVERY_S
+        return Notice(
+            pb.WARNING,
+            "qp_fallback",
+            f"the QP gave no usable step, the damped law went on instead; {count} times so far",
+        )
 
-    def _dither_pa(self, now_s: float) -> float:
-        """What is added to every setpoint.
-
-        Only a reference that is followed with the tip measured needs it; a camera lost on the way
-        changes nothing.
-        """
-        if not self._follower.follows:
-            self._dither_since_s = None
-            self._go_to_share(1.0)
-            return 0.0
-        if self._dither_since_s is None:
-            if not (self.observer.seen and self._feedback.enabled):
-                return 0.0
-            self._dither_since_s = now_s
-        share = min(1.0, (now_s - self._dither_since_s) / _RAMP_S)
-        self._follow_share()
-        return share * self._dither.at_pa(now_s)
-
-    def _follow_share(self) -> None:
-        """Let the inverted share of the hysteresis follow the speed of the reference."""
-        motion, feedback = self._follower.motion, self._feedback
-        speed_m_s = 0.0 if motion is None else math.hypot(*motion.velocity[:3])
-        at_rest, moving = feedback.hysteresis_share, feedback.hysteresis_share_moving
-        self._go_to_share(at_rest + min(1.0, speed_m_s / _MOVING_M_S) * (moving - at_rest))
-
-    def _go_to_share(self, wanted: float) -> None:
-        largest = self._dt_s / _RAMP_S
-        self._share += min(max(wanted - self._share, -largest), largest)
-        self._controller.set_hysteresis_share(self._share)
-
-    def observe(self, vented: bool) -> None:
+    def observe(self, vented: bool) -> Notice | None:
         """Let the observer see this tick's command; tell when the camera is lost or back."""
-        self.observer.step(self._vented_m if vented else self._controller.lengths_m)
-        if self.observer.seen == self._seen:
-            return
-        self._seen = self.observer.seen
-        if self._seen:
-            self._tell(pb.INFO, "camera_seen", "measured tip poses arrive", "", "")
-        else:
-            self._tell(
-                pb.WARNING,
-                "camera_lost",
-                "no measured tip pose arrives; the correction stays as it is",
-                f"none was taken for {1e3 * self._feedback.timeout_s:g} ms",
-                "look at the marker and the motion-capture program",
-            )
+        self._observer.step(self._vented_m if vented else self._controller.lengths_m)
+        if self._observer.seen == self._camera_seen:
+            return None
+        self._camera_seen = self._observer.seen
+        if self._camera_seen:
+            return Notice(pb.INFO, "camera_seen", "measured tip poses arrive")
+        return Notice(
+            pb.WARNING,
+            "camera_lost",
+            "no measured tip pose arrives; the correction stays as it is",
+            f"none was taken for {1e3 * self._feedback.timeout_s:g} ms",
+            "look at the marker and the motion-capture program",
+        )
 
-    def fill(self, tick: np.ndarray, estimate: TipEstimate) -> None:
-        """Write down reference, model, correction and estimate."""
-        observer = self.observer
-        tick["tip_model_position_m"] = observer.prediction.ago(0.0)[0]
-        tick["tip_offset_m"] = observer.offset_m
-        tick["tip_offset_orientation_xyzw"] = observer.quaternion_xyzw
-        tick["tip_estimated_position_m"] = estimate.position_m
-        tick["tip_estimated_orientation_xyzw"] = quaternion_from_rotation(estimate.rotation)
-        tick["tip_estimated_sigma_m"] = estimate.sigma_m
-        tick["tip_estimated_source"] = int(estimate.source)
-        tick["tip_poses_refused"] = observer.refused
-        motion = self._follower.motion
-        if motion is None:
-            tick["reference_position_m"] = tick["reference_velocity_m_s"] = _NONE
-            tick["reference_error_m"] = 0.0
-            return
-        tick["reference_position_m"] = motion.position[:3]
-        tick["reference_velocity_m_s"] = motion.velocity[:3]
-        error_m = math.dist(estimate.position_m.tolist(), motion.position[:3])
-        tick["reference_error_m"] = error_m
-        self._near = error_m <= self._controller.settings.reached_tolerance_m
+    def estimate(self, measurement: Measurement) -> Estimate:
+        """Lengths and tip from what was measured; call it after :meth:`observe`."""
+        lengths_m = self._estimator.lengths_m(measurement.pressures_pa, measurement.lengths_m)
+        tip = self._estimator.tip_estimate(lengths_m, measurement.lengths_m, self._observer)
+        reference = self._follower.motion
+        if reference is None:
+            return Estimate(lengths_m, tip, 0.0)
+        error_m = math.dist(tip.position_m.tolist(), reference.position[:3])
+        self._near_reference = error_m <= self._controller.settings.reached_tolerance_m
+        return Estimate(lengths_m, tip, error_m)
 
-    def goal(self) -> tuple[Array | list[float], Array | None]:
-        """Position (3,) that is wanted now, a shape's on the shape, and quaternion or None."""
+    def steered(self) -> Steered:
+        """How the commanded arm stands after this tick."""
+        controller, observer = self._controller, self._observer
+        stuck = controller.reach == Reach.OUT_OF_REACH
+        goal_m, goal_quaternion_xyzw = self._goal()
+        return Steered(
+            lengths_m=controller.lengths_m,
+            law=controller.law_name,
+            reach=controller.reach,
+            error_m=controller.error_m,
+            binding=controller.binding() if stuck else 0,
+            qp_fallbacks=controller.fallbacks,
+            goal_m=goal_m,
+            goal_quaternion_xyzw=goal_quaternion_xyzw,
+            reference=self._follower.motion,
+            tip_model_m=observer.prediction.ago(0.0)[0],
+            tip_offset_m=observer.offset_m,
+            tip_offset_quaternion_xyzw=observer.quaternion_xyzw,
+            tip_poses_refused=observer.refused,
+        )
+
+    def _goal(self) -> tuple[Array | list[float] | None, Array | None]:
+        """Position (3,) that is wanted now, a shape's on the shape, and quaternion; or None."""
         target = self._target
-        if isinstance(target, PoseTarget):
-            return target.position_m, target.quaternion_xyzw
-        if isinstance(target, PositionTarget):
-            return target.position_m, None
         if isinstance(target, ShapeTarget):
             return self._follower.goal_position, None
-        return _NONE, None
+        return (None, None) if target is None else target.goal()

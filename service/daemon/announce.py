@@ -22,7 +22,7 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
     arm, zenoh, rerun = configuration.arm, configuration.zenoh, configuration.rerun
     sections = len(arm.sections)
     device = backends.address(configuration)
-    if configuration.hardware.adapter == "simulator":
+    if configuration.is_simulated:
         device += f", seed {configuration.simulator.seed}"
     lines = [
         f"arm        {arm.name}: {sections} section{'s' * (sections > 1)}, {3 * sections} chambers",
@@ -64,7 +64,7 @@ class Announcer:
         second = int(time.monotonic())
         if second != self._second:
             if self._withheld:
-                self._say(f"({self._withheld} more events; all of them are in the log)")
+                self._say(f"({self._withheld} more events, not shown here)")
             self._second, self._lines, self._withheld = second, 0, 0
         self._lines += 1
         if self._lines > _LINES_PER_S and event.level != pb.ERROR:

@@ -4,9 +4,9 @@ import platform
 from importlib.metadata import version
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.hardware.simulator.device import drawn_parameters
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration
-from pneuarm.service.devices import registry as backends
 
 _PACKAGES = (
     "pneuarm",
@@ -35,5 +35,7 @@ def info_of(configuration: Configuration, arm: Arm, log_path: str) -> pb.Info:
         versions=versions,
         log_path=log_path,
         rate_hz=configuration.control.rate_hz,
-        simulator=backends.drawn_parameters(configuration, arm),
+        simulator=drawn_parameters(configuration.simulator, arm)
+        if configuration.is_simulated
+        else {},
     )

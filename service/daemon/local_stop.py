@@ -9,7 +9,7 @@ import contextlib
 import socket
 import struct
 
-from pneuarm.controllers.arm.errors import ConfigurationError, DaemonUnreachable, NotConfirmed
+from pneuarm.controllers.arm.errors import AlreadyInUse, DaemonUnreachable, NotConfirmed
 
 _CONFIRM_S = 1.0
 
@@ -19,28 +19,31 @@ def _address(kind: str, name: str) -> str:
 
 
 def lock(kind: str, name: str) -> socket.socket:
-    """Take the lock on a device or an arm; raises ConfigurationError if another daemon has it."""
+    """Take the lock on a device or an arm; raises AlreadyInUse if another daemon has it."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
     try:
         listener.bind(_address(kind, name))
     except OSError as error:
         listener.close()
-        raise ConfigurationError(
-            f"{kind} {name!r} is in use by another pneuarm daemon{_holder(kind, name)}; stop that "
-            f"one first, or name another {kind}"
+        process_id = _holder(kind, name)
+        who = f" (process {process_id})" if process_id is not None else ""
+        raise AlreadyInUse(
+            f"{kind} {name!r} is in use by another pneuarm daemon{who}; stop that one first, or "
+            f"name another {kind}",
+            process_id,
         ) from error
     listener.listen(8)
     return listener
 
 
-def _holder(kind: str, name: str) -> str:
+def _holder(kind: str, name: str) -> int | None:
     """Process number of who holds a lock, as far as the kernel tells."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe, contextlib.suppress(OSError):
         probe.settimeout(0.2)
         probe.connect(_address(kind, name))
         credentials = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
-        return f" (process {struct.unpack('3i', credentials)[0]})"
-    return ""
+        return int(struct.unpack("3i", credentials)[0])
+    return None
 
 
 def stop_locally(arm_name: str) -> None:

@@ -6,6 +6,7 @@ from multiprocessing.connection import Connection
 from pneuarm.controllers.arm.errors import LogError
 from pneuarm.logs.recording.recorder import Recorder, RecorderSettings
 from pneuarm.service.configuration.configuration import log_directory
+from pneuarm.service.processes import realtime
 from pneuarm.service.processes.shared import Shared, ignore_terminal_signals, parent_is_alive
 
 _MIB = 1024 * 1024
@@ -13,6 +14,9 @@ _IDLE_S = 0.02
 
 #: After the order to end: the writers have stopped when nothing came for this long.
 _QUIET_S = 0.2
+
+#: Where the system grants it: what the recorder does is little, and nobody else can do it later.
+_AHEAD_OF_OTHERS = 10
 
 #: How long a full disk is tried again at the end before what is left is given up.
 _GIVE_UP_S = 10.0
@@ -35,6 +39,7 @@ def settings(shared: Shared) -> RecorderSettings:
 def main(shared: Shared, end: Connection) -> None:
     """Entry point of the process; ends when told through ``end``, or when its parent is gone."""
     ignore_terminal_signals()
+    realtime.step_forward(_AHEAD_OF_OTHERS)
     recorder = Recorder(settings(shared), shared.info, shared.rings, shared.recorder)
     while not end.poll() and parent_is_alive():
         if recorder.step() == 0:

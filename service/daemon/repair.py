@@ -5,7 +5,8 @@ from multiprocessing.context import SpawnContext
 from pathlib import Path
 
 from pneuarm.controllers.arm.errors import LogError
-from pneuarm.logs.recording.session import repair, unfinished
+from pneuarm.logs.recording.repair import Mended, repair
+from pneuarm.logs.recording.session import unfinished
 
 
 def _mend(paths: list[Path]) -> None:
@@ -15,14 +16,21 @@ def _mend(paths: list[Path]) -> None:
     realtime.step_back(19)
     for path in paths:
         try:
-            mended, messages = repair(path)
+            print(_outcome(path, repair(path)), flush=True)
         except LogError as error:
             print(f"WARNING    {error}", flush=True)
-            continue
-        if messages:
-            print(f"repaired   {mended}: {messages} messages", flush=True)
-        else:
-            print(f"WARNING    {path.name} holds nothing; set aside as {mended.name}", flush=True)
+
+
+def _outcome(path: Path, mended: Mended) -> str:
+    if mended.path is None:
+        return f"WARNING    {path.name} holds nothing; set aside as {mended.kept}"
+    told = f"{mended.path}: {mended.messages} messages"
+    if mended.kept is None:
+        return f"repaired   {told}"
+    return (
+        f"WARNING    repaired {told}; {mended.dropped_bytes} bytes are damaged and left out: the "
+        f"original is kept as {mended.kept.name}"
+    )
 
 
 def start_mending(directory: Path, context: SpawnContext) -> list[Path]:

@@ -42,6 +42,10 @@ class ServiceManager:
             self._stopping = True
             self._send("STOPPING=1")
 
+    def needs_longer(self, seconds: float) -> None:
+        """Ask not to be killed for this much longer while the end goes on."""
+        self._send(f"EXTEND_TIMEOUT_USEC={int(seconds * 1e6)}")
+
     def _send(self, text: str) -> None:
         """Send without ever waiting; a service manager that does not read misses something."""
         if self._address:

@@ -22,6 +22,7 @@ from pneuarm.service.configuration.configuration import Configuration, log_direc
 from pneuarm.service.daemon.announce import Announcer, start_facts
 from pneuarm.service.daemon.info import info_of
 from pneuarm.service.daemon.local_stop import lock
+from pneuarm.service.daemon.log_watch import LogWatch
 from pneuarm.service.daemon.repair import start_mending
 from pneuarm.service.daemon.sd_notify import ServiceManager
 from pneuarm.service.devices import registry as backends
@@ -41,8 +42,21 @@ HEARTBEAT_S = 0.1
 _FIRST_TICK_S = 20.0
 _END_S = 5.0
 
-#: The end takes no longer than this: more than all its patience together.
+#: A recorder that gets no further for this long at the end is stuck.
+_RECORDER_PATIENCE_S = 30.0
+
+#: The end takes no longer than this, but for a recorder that still gets further: more than all its
+#: patience together.
 LAST_RESORT_S = 60.0
+
+#: Module of each process, with its `main`.
+MODULES = {
+    "control": "pneuarm.service.control.process",
+    "device": "pneuarm.service.devices.process",
+    "gateway": "pneuarm.service.wire.gateway",
+    "recorder": "pneuarm.service.daemon.recorder",
+    "viewer": "pneuarm.service.daemon.viewer",
+}
 
 #: Libraries that would start threads of their own in every process.
 _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -64,6 +78,7 @@ class Supervisor:
         self._context = get_context("spawn")
         self._shared = self._share(configuration)
         self._events = MessageWriter(self._shared.rings.supervisor)
+        self._log_watch = LogWatch(self._shared.rings, self._shared.recorder)
         self._announcer = Announcer(self._shared.rings, say)
         self._ticks = RingReader(self._shared.rings.ticks)
         self._control_pipe, self._control_end = new_pipe()
@@ -130,7 +145,7 @@ class Supervisor:
         if self._shared.device is None:
             return None
         arguments = (self._shared, self._arm_lock, self._device_lock)
-        child = Child("device", self._context, arguments, self._shared.processes)
+        child = Child("device", MODULES["device"], self._context, arguments, self._shared.processes)
         self._children["device"] = child
         return DeviceKeeper(configuration, self._shared.device, child)
 
@@ -199,7 +214,7 @@ class Supervisor:
             self._add("viewer", (shared,))
 
     def _add(self, name: str, arguments: tuple[object, ...]) -> Child:
-        child = Child(name, self._context, arguments, self._shared.processes)
+        child = Child(name, MODULES[name], self._context, arguments, self._shared.processes)
         child.start()
         self._children[name] = child
         return child
@@ -211,6 +226,7 @@ class Supervisor:
             self._announcer.step()
             self._look_after_device()
             self._revive()
+            self._look_after_log()
             head, now_s = self._ticks.head(), time.monotonic()
             if head != newest:
                 newest, seen_s = head, now_s
@@ -229,6 +245,12 @@ class Supervisor:
                 f"the device process is lost and the device could not be vented: {failed}",
                 remedy="cut the air supply; the device's own watchdog zeroes it where it has one",
             )
+
+    def _look_after_log(self) -> None:
+        """Tell, while it happens, that the log lacks something or is about to."""
+        found = self._log_watch.look(time.monotonic())
+        if found is not None:
+            self._tell(pb.WARNING, found.code, found.text, found.cause, found.remedy)
 
     def _revive(self) -> None:
         """Start dead processes but control again; the arm goes on, holds, or is in fault."""
@@ -314,13 +336,28 @@ class Supervisor:
             child = self._children.get(name)
             if child is not None and name != "recorder":  # which has something to write
                 child.end_if_loading()
-            if child is not None and not child.end(self._patience_s(name)):
+            if child is not None and not child.end(*self._patience(name)):
                 self._say(f"WARNING    the {name} process did not end by itself and was killed")
         self._announcer.step()
+        if "recorder" in self._children and (lacks := self._log_watch.lacks()):
+            self._say(f"WARNING    {lacks}")
 
-    @staticmethod
-    def _patience_s(name: str) -> float:
-        return {"recorder": 30.0, "device": 6.0}.get(name, 2.0)
+    def _patience(self, name: str) -> tuple[float, Callable[[], object]]:
+        """How long a process may take to end, from where it was last seen to get further."""
+        if name == "recorder":
+            return _RECORDER_PATIENCE_S, self._recorded
+        return (6.0 if name == "device" else 2.0), lambda: None
+
+    def _recorded(self) -> object:
+        """Say how far the recorder is; as long as it gets further, nobody ends the end."""
+        recorded = self._log_watch.recorded()
+        if recorded != self._last_recorded:
+            self._last_recorded = recorded
+            faulthandler.dump_traceback_later(LAST_RESORT_S, exit=True)
+            self._service_manager.needs_longer(LAST_RESORT_S)
+        return recorded
+
+    _last_recorded: object = None
 
     def _tell(
         self, level: "pb.Level", code: str, text: str, cause: str = "", remedy: str = ""

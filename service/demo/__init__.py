@@ -1,1 +1,1 @@
-"""`pneuarm demo`: the daemon, a client, and the table at the end."""
+"""`pneuarm demo`: daemon and client as processes, and the table of figures at the end."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm
-from pneuarm.controllers.arm.errors import DaemonUnreachable, ModeRefused, TargetRejected
+from pneuarm.controllers.arm.errors import HardwareError, ModeRefused, TargetRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import check
@@ -63,7 +63,7 @@ def _progress(label: str, share: float) -> None:
         print(f"\r{label:32} [{bar:30}]", end="", file=sys.stderr, flush=True)
 
 
-def perform(
+def draw_figures(
     client: Client, arm: Arm, label: str, seconds: dict[str, float]
 ) -> dict[str, tuple[int, int]]:
     """Go through the phases that ``seconds`` names; 0 is at the figures' middle."""
@@ -110,7 +110,7 @@ def _wait_for_camera(client: Client) -> None:
     give_up_s = time.monotonic() + _CAMERA_S
     while client.state().tip_estimated_source != pb.FROM_TIP_POSE:
         if time.monotonic() > give_up_s:
-            raise DaemonUnreachable("no measured tip pose arrives from the simulated camera")
+            raise HardwareError("no measured tip pose arrives from the simulated camera")
         time.sleep(0.02)
 
 
@@ -123,7 +123,7 @@ def main() -> int:
         client.enable()
         if wanted["camera"]:
             _wait_for_camera(client)
-        phases = perform(client, arm, wanted["label"], wanted["seconds"])
+        phases = draw_figures(client, arm, wanted["label"], wanted["seconds"])
     print(json.dumps(phases))
     return 0
 

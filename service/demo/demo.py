@@ -22,7 +22,7 @@ from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import Configuration, check, load
 from pneuarm.service.demo.device import emulated
 from pneuarm.service.demo.figures import Drawn, evaluate, table
-from pneuarm.service.demo.parts import Part, parts, tables
+from pneuarm.service.demo.parts import DemoPart, parts, tables
 from pneuarm.service.demo.screen import Screen
 
 _START_S = 30.0
@@ -54,7 +54,7 @@ def _laid_over(arguments: argparse.Namespace, device: dict[str, object]) -> dict
 
 
 def _play(
-    part: Part, nominal: Configuration, screen: Screen, arguments: argparse.Namespace
+    part: DemoPart, nominal: Configuration, screen: Screen, arguments: argparse.Namespace
 ) -> Drawn:
     """Run one daemon and its client; return where the part's records are."""
     configuration = part.configuration()
@@ -102,7 +102,7 @@ def _wait_for_daemon(daemon: "subprocess.Popen[bytes]", arm: str, endpoint: str)
 
 
 @contextmanager
-def _camera(part: Part, arm: str, endpoint: str) -> Iterator[None]:
+def _camera(part: DemoPart, arm: str, endpoint: str) -> Iterator[None]:
     """Let a simulated motion capture see the tip, where the part has one."""
     if not part.camera:
         yield
@@ -122,7 +122,7 @@ def _camera(part: Part, arm: str, endpoint: str) -> Iterator[None]:
         camera.wait(10)
 
 
-def _run_client(part: Part, nominal: Configuration, endpoint: str) -> dict[str, list[int]]:
+def _run_client(part: DemoPart, nominal: Configuration, endpoint: str) -> dict[str, list[int]]:
     """Let the client draw; the size of the figures is that of the nominal arm in every part."""
     client = subprocess.run(
         [

@@ -8,32 +8,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pneuarm.controllers.arm.errors import PneuarmError
-from pneuarm.service.configuration.configuration import Configuration, check, load
-
-#: What a section needs where a device cannot move a built-in arm: an ESP32's pump gives 0.13 bar,
-#: so its chambers are soft enough to lengthen as far under less.
-_SECTIONS: dict[str, dict[str, float]] = {
-    "esp32": {
-        "pressure_min_bar": 0.0,
-        "pressure_max_bar": 0.12,
-        "pressure_slew_max_bar_s": 0.6,
-        "lengthening_mm_per_bar": 500.0,
-        "softening_mm_per_bar2": 0.0,
-    }
-}
+from pneuarm.controllers.arm.errors import InvalidInput, PneuarmError
+from pneuarm.hardware.device import EmulatedDevice
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
+from pneuarm.service.configuration.devices import devices
+from pneuarm.service.devices.registry import fitting
+from pneuarm.service.emulators.command import LAST_LINE
 
 
 @contextmanager
 def emulated(adapter: str, arm: str, seed: int) -> Iterator[dict[str, object]]:
     """Run an emulator while the context lasts; yields its tables of the configuration.
 
-    The simulator needs none. Raises PneuarmError where the emulator does not start.
+    A simulated arm needs none. Raises PneuarmError where the emulator does not start.
     """
-    if adapter == "simulator":
+    device = devices().named(adapter)
+    if device is SIMULATOR:
         yield {}
         return
-    configuration = fitting(adapter, arm)
+    if not isinstance(device, EmulatedDevice):
+        raise InvalidInput(f"--adapter {adapter}: this device has no emulator to show")
+    configuration = fitting(device, arm)
     with tempfile.TemporaryDirectory(prefix="pneuarm-demo-") as folder:
         path = Path(folder) / "device.toml"
         path.write_text(configuration.to_toml())
@@ -55,19 +50,11 @@ def emulated(adapter: str, arm: str, seed: int) -> Iterator[dict[str, object]]:
             emulator.wait(10)
 
 
-def fitting(adapter: str, arm: str) -> Configuration:
-    """Return a built-in arm, or where the device cannot move it, one of its size that it can."""
-    tables = load(preset=arm).model_dump(exclude_none=True)
-    own = _SECTIONS.get(adapter, {})
-    tables["arm"]["sections"] = [section | own for section in tables["arm"]["sections"]]
-    return check(tables, f"the arm for {adapter}")
-
-
 def _tables(emulator: "subprocess.Popen[str]", adapter: str) -> dict[str, object]:
     """Read the configuration lines that an emulator prints, to the comment that ends them."""
     lines: list[str] = []
     for line in emulator.stdout or ():
-        if line.startswith("# faults"):
+        if line.startswith(LAST_LINE):
             return tomllib.loads("".join(lines))
         lines.append(line)
     raise PneuarmError(f"the emulator of {adapter} did not start; see its line above")

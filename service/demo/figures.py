@@ -11,6 +11,7 @@ import numpy as np
 
 from pneuarm.controllers.feedback.estimator import EstimateSource
 from pneuarm.logs.reading.reader import LogReader
+from pneuarm.logs.reading.summary import summarise
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class _Read:
 
     drawn: Drawn
     ticks: np.ndarray
+    missing_ticks: int
     log_bytes: int
 
     @property
@@ -77,15 +79,11 @@ class _Read:
         senses = (self.ticks["tip_estimated_source"] == EstimateSource.LENGTHS).any()
         return "by lengths" if senses else "by pressures"
 
-    @property
-    def missing(self) -> int:
-        numbers = self.ticks["sequence"]
-        return int(numbers[-1]) - len(np.unique(numbers))
-
 
 def _read(drawn: Drawn) -> _Read:
     reader = LogReader(drawn.log)
-    return _Read(drawn, reader.ticks(), sum(part.stat().st_size for part in reader.parts))
+    summary = summarise(reader)
+    return _Read(drawn, reader.ticks(), summary.missing_ticks, summary.size_bytes)
 
 
 def evaluate(drawn: Sequence[Drawn]) -> Figures:
@@ -100,7 +98,7 @@ def evaluate(drawn: Sequence[Drawn]) -> Figures:
         overruns=sum(int(each["overruns"][-1]) for each in ticks),
         wake_us=_latency(np.concatenate([each["wake_latency_s"] for each in ticks])),
         compute_us=_latency(np.concatenate([each["compute_s"][1:] for each in ticks])),
-        missing_records=sum(run.missing for run in runs),
+        missing_records=sum(run.missing_ticks for run in runs),
         tip_rms_error_mm=last.error_mm(*moving),
         eight_rms_error_mm={run.name: run.error_mm("eight") for run in runs},
         log=str(last.drawn.log),

@@ -5,12 +5,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 
 
 @dataclass(frozen=True)
-class Part:
+class DemoPart:
     """One daemon's run. ``seconds`` says how long each phase lasts; ``camera``: the tip is seen."""
 
     name: str
@@ -27,7 +28,7 @@ def tables(seed: int) -> dict[str, object]:
     """
     return {
         "control": {"target_timeout_ms": 2000.0},
-        "simulator": {"seed": seed},
+        SIMULATOR.table: {"seed": seed},
         "zenoh": {"listen": [f"tcp/127.0.0.1:{_free_port()}"]},
         "rerun": {"port": _free_port(), "start_server": False, "recording": "pneuarm-demo"},
     }
@@ -40,12 +41,12 @@ def _free_port() -> int:
         return port
 
 
-def parts(configuration: Configuration, seconds: float) -> list[Part]:
+def parts(configuration: Configuration, seconds: float) -> list[DemoPart]:
     """Return what is shown in about ``seconds`` of drawing."""
-    if configuration.hardware.adapter != "simulator":
+    if not configuration.is_simulated:
         whole = {"circle": 0.45 * seconds, "eight": 0.45 * seconds, "out of reach": 1.0}
         caption = "through the emulated device: its true tip is not known"
-        return [Part("device", caption, lambda: configuration, False, whole)]
+        return [DemoPart("device", caption, lambda: configuration, False, whole)]
     found: list[Configuration] = []
 
     def calibrated() -> Configuration:
@@ -56,9 +57,9 @@ def parts(configuration: Configuration, seconds: float) -> list[Part]:
 
     eight = {"eight": 0.25 * seconds}
     return [
-        Part("uncalibrated", "1 uncalibrated", lambda: configuration, False, eight),
-        Part("calibrated", "2 calibrated", calibrated, False, eight),
-        Part(
+        DemoPart("uncalibrated", "1 uncalibrated", lambda: configuration, False, eight),
+        DemoPart("calibrated", "2 calibrated", calibrated, False, eight),
+        DemoPart(
             "feedback",
             "3 calibrated, tip measured",
             calibrated,

@@ -1,65 +1,12 @@
-"""Adapter's name -> device, loaded only when it is asked for."""
-
-import os
-import socket
-from collections.abc import Callable
-from contextlib import suppress
+"""The configured device: built, checked against the arm, and where its lock is."""
 
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.hardware.device import Address, InMemory
 from pneuarm.hardware.interface import Hardware
-from pneuarm.service.configuration.configuration import Configuration
-
-#: Adapters that never wait: they run inside of control. All others have a process of their own.
-_IN_CONTROL = frozenset({"simulator"})
-
-
-def _simulator(configuration: Configuration, arm: Arm) -> Hardware:
-    from pneuarm.hardware.simulator.adapter import SimulatedArm
-    from pneuarm.hardware.simulator.parameters import SimulatorParameters
-
-    simulated = configuration.build_simulated_arm()
-    return SimulatedArm(simulated, SimulatorParameters(), configuration.simulator.seed)
-
-
-def _festo_cpx(configuration: Configuration, arm: Arm) -> Hardware:
-    from pneuarm.service.devices.festo import cpx
-
-    return cpx(configuration, arm)
-
-
-def _festo_vtem(configuration: Configuration, arm: Arm) -> Hardware:
-    from pneuarm.service.devices.festo import vtem
-
-    return vtem(configuration, arm)
-
-
-def _ctrl_p(configuration: Configuration, arm: Arm) -> Hardware:
-    from pneuarm.service.devices.serial_devices import ctrl_p
-
-    return ctrl_p(configuration, arm)
-
-
-def _esp32(configuration: Configuration, arm: Arm) -> Hardware:
-    from pneuarm.service.devices.serial_devices import esp32
-
-    return esp32(configuration, arm)
-
-
-def _replay(configuration: Configuration, arm: Arm) -> Hardware:
-    from pneuarm.service.devices.serial_devices import replay
-
-    return replay(configuration, arm)
-
-
-_BUILDERS: dict[str, Callable[[Configuration, Arm], Hardware]] = {
-    "simulator": _simulator,
-    "festo-cpx": _festo_cpx,
-    "festo-vtem": _festo_vtem,
-    "ctrl-p": _ctrl_p,
-    "esp32": _esp32,
-    "replay": _replay,
-}
+from pneuarm.service.configuration.configuration import Configuration, load
+from pneuarm.service.configuration.configuration import check as check_tables
+from pneuarm.service.configuration.devices import AnyDevice, devices
 
 
 def build(configuration: Configuration, arm: Arm) -> Hardware:
@@ -67,62 +14,56 @@ def build(configuration: Configuration, arm: Arm) -> Hardware:
 
     Raises ConfigurationError where it cannot be wired to the arm as configured.
     """
-    return _BUILDERS[configuration.hardware.adapter](configuration, arm)
+    device = configuration.device
+    return device.build(configuration.of_device(device), arm)
 
 
 def check(configuration: Configuration) -> None:
     """Raise ConfigurationError for a device that may not be started; touches none."""
-    if configuration.hardware.adapter == "simulator":
-        return
-    device = build(configuration, configuration.build_arm())
-    if not device.has_watchdog and not configuration.hardware.accept_no_watchdog:
+    if not in_control(configuration):
+        build(configuration, configuration.build_arm())
+    left_behind = _left_behind(configuration)
+    if left_behind and not configuration.hardware.accept_no_watchdog:
         raise ConfigurationError(
-            f"hardware.adapter = {configuration.hardware.adapter!r}: {_left_behind(device)}; set "
+            f"hardware.adapter = {configuration.device.name!r}: {left_behind}; set "
             "hardware.accept_no_watchdog = true if a hand is always on the air supply"
         )
 
 
-def _left_behind(device: Hardware) -> str:
-    """Say what a device without a watchdog leaves in the arm, in its own words where it has any."""
-    usual = "without a watchdog it keeps the last pressures when this machine dies"
-    return str(getattr(device, "left_behind", usual))
+def _left_behind(configuration: Configuration) -> str:
+    device = configuration.device
+    return device.left_behind(configuration.of_device(device))
 
 
 def in_control(configuration: Configuration) -> bool:
     """Whether the device runs inside of control, for it never waits."""
-    return configuration.hardware.adapter in _IN_CONTROL
+    return configuration.device.never_waits
 
 
 def warnings(configuration: Configuration) -> list[str]:
-    """Return what the start must say about the device."""
-    if in_control(configuration) or not configuration.hardware.accept_no_watchdog:
-        return []
-    device = build(configuration, configuration.build_arm())
-    return [] if device.has_watchdog else [_left_behind(device)]
+    """Return what the start must say: what stays in the arm, which other devices are broken."""
+    told = [_left_behind(configuration), *map(str, devices().broken.values())]
+    return [text for text in told if text]
+
+
+def location(configuration: Configuration) -> Address:
+    """Return where the device is."""
+    device = configuration.device
+    return device.address(configuration.of_device(device))
 
 
 def address(configuration: Configuration) -> str:
     """What the lock is on: one daemon a device, whatever the arm or the adapter is called."""
-    adapter = configuration.hardware.adapter
-    terminals = {"festo-cpx": configuration.festo_cpx, "festo-vtem": configuration.festo_vtem}
-    if adapter in terminals:
-        terminal = terminals[adapter]
-        host = terminal.host
-        with suppress(OSError, UnicodeError):
-            host = socket.gethostbyname(host)
-        return f"tcp/{host}:{terminal.port}"
-    ports = {"ctrl-p": configuration.ctrl_p.device, "esp32": configuration.esp32.device}
-    if adapter in ports:  # by whatever link it is called
-        return f"serial:{os.path.realpath(ports[adapter])}"
-    return configuration.device_address
+    where = location(configuration)
+    if isinstance(where, InMemory):
+        name = configuration.hardware.device or configuration.arm.name
+        return f"{configuration.device.name}:{name}"
+    return where.lock
 
 
-def drawn_parameters(configuration: Configuration, arm: Arm) -> dict[str, float]:
-    """Every parameter that the simulator draws from its seed, to repeat the run."""
-    if configuration.hardware.adapter != "simulator":
-        return {}
-    from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
-
-    drawn = draw(SimulatorParameters(), configuration.simulator.seed, arm.n_sections).as_dict()
-    del drawn["lowest_mode_hz"]  # follows from the others, and is known once the rod is built
-    return drawn
+def fitting(device: AnyDevice, preset: str) -> Configuration:
+    """Return a built-in arm, or where the device cannot move it, one of its size that it can."""
+    tables = load(preset=preset).model_dump(exclude_none=True)
+    own = device.demo_section
+    tables["arm"]["sections"] = [section | own for section in tables["arm"]["sections"]]
+    return check_tables(tables, f"the arm for {device.name}")

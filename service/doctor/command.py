@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.service.configuration.configuration import Configuration, load
+from pneuarm.service.configuration.devices import devices
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.doctor import device, machine, places, rights, timing
 from pneuarm.service.doctor.finding import Finding, Verdict, summary
@@ -55,6 +56,11 @@ def _configuration(configuration: Configuration, path: Path | None) -> Finding:
         backends.check(configuration)
     except ConfigurationError as error:
         return Finding("configuration", Verdict.FAILED, f"{text}\n{error}")
+    broken = list(devices().broken.values())
+    if broken:
+        remedy = f"pip uninstall {broken[0].package}   # or mend it"
+        whole = "\n".join((text, *map(str, broken)))
+        return Finding("configuration", Verdict.WARNING, whole, remedy)
     return Finding("configuration", Verdict.OK, text)
 
 

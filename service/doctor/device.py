@@ -7,8 +7,9 @@ import shlex
 import socket
 import time
 
+from pneuarm.hardware.device import Bus, SerialPort, TcpPort
 from pneuarm.service.configuration.configuration import Configuration
-from pneuarm.service.devices.access import serial_paths, tcp_address
+from pneuarm.service.devices import registry as backends
 from pneuarm.service.doctor.finding import Finding, Verdict
 
 _NAME = "device"
@@ -17,16 +18,16 @@ _PATIENCE_S = 1.0
 
 def reachable(configuration: Configuration) -> Finding:
     """Look for the configured device: a file for a serial line, a connection for the network."""
-    adapter = configuration.hardware.adapter
-    if adapter == "simulator":
-        return Finding(_NAME, Verdict.OK, "simulated: there is nothing to reach")
-    paths = serial_paths(configuration)
-    if paths:
-        return serial(paths[0])
-    address = tcp_address(configuration)
-    if address:
-        return network(*address)
-    return Finding(_NAME, Verdict.INFO, f"{adapter}: no address that could be tried from here")
+    match backends.location(configuration):
+        case SerialPort("") | TcpPort(""):
+            return Finding(_NAME, Verdict.INFO, "nobody has said where it is")
+        case SerialPort(path):
+            return serial(path)
+        case TcpPort(host, port):
+            return network(host, port)
+        case Bus(name):
+            return Finding(_NAME, Verdict.INFO, f"{name} cannot be tried from here")
+    return Finding(_NAME, Verdict.OK, "in this machine's memory: there is nothing to reach")
 
 
 def serial(path: str) -> Finding:

@@ -2,7 +2,6 @@
 
 import os
 import platform
-import re
 import shutil
 import tempfile
 import time
@@ -11,7 +10,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.arm.errors import AlreadyInUse, ConfigurationError
 from pneuarm.logs.rings.rings import HOLD_S
 from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.service.configuration.configuration import Configuration, log_directory
@@ -90,11 +89,11 @@ def other_daemon(configuration: Configuration) -> Finding:
     ):
         try:
             lock(kind, value).close()
-        except ConfigurationError as error:
-            found = re.search(r"\(process (\d+)\)", str(error))
-            who = f"process {found[1]}" if found else "another process"
+        except AlreadyInUse as error:
+            number = error.process_id
+            who = f"process {number}" if number else "another process"
             text = f"{kind} {value} is in use by a running daemon ({who})"
-            remedy = f"kill {found[1]}   # it vents the arm and ends" if found else ""
+            remedy = f"kill {number}   # it vents the arm and ends" if number else ""
             return Finding(name, Verdict.WARNING, text, remedy)
     return Finding(name, Verdict.OK, f"{configuration.arm.name}: no other daemon has it")
 

@@ -18,8 +18,11 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf.message import DecodeError
 
 from pneuarm.controllers.arm.errors import DaemonUnreachable, InvalidInput
-from pneuarm.controllers.geometry.frames import Frames, Transform
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
+from pneuarm.controllers.geometry.mountings import Mountings, Transform
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
 from pneuarm.logs.schema.topics import STATE, TIP_POSE, full_key
@@ -36,7 +39,7 @@ class Camera:
     """Poses of the marker: ``delay_s`` late, with noise; at most ``rate_hz`` a second."""
 
     def __init__(
-        self, rate_hz: float, delay_s: float, noise_m: float, seed: int, frames: Frames
+        self, rate_hz: float, delay_s: float, noise_m: float, seed: int, frames: Mountings
     ) -> None:
         self._period_s, self._delay_s, self._noise_m = 1.0 / rate_hz, delay_s, noise_m
         self._rng = np.random.default_rng(seed)
@@ -102,7 +105,7 @@ def emulate_camera(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _frames(arguments: argparse.Namespace) -> Frames:
+def _frames(arguments: argparse.Namespace) -> Mountings:
     """Ask the daemon where motion capture, marker and tool are."""
     with Client(arguments.arm, arguments.connect, "camera") as client:
         return check(tomllib.loads(client.info().config_toml), "the daemon").frames.frames()

@@ -1,39 +1,68 @@
 """`pneuarm emulate`: a device without the device, behind its real transport."""
 
 import argparse
-import importlib
-from collections.abc import Callable
+import json
+import signal
+import threading
+from collections.abc import Mapping
 from pathlib import Path
 
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.hardware.device import EmulatedDevice
 from pneuarm.hardware.emulation.emulation import DeviceRecord, EmulatedArm
+from pneuarm.hardware.transports.transport_faults import start_console
 from pneuarm.service.configuration.configuration import PRESETS, Configuration, load
+from pneuarm.service.configuration.devices import AnyDevice, devices
+from pneuarm.service.processes import realtime
 
-#: What can be emulated -> "module:function" of ``(arguments, configuration) -> exit status``.
-EMULATORS = {
-    "festo-cpx": "pneuarm.service.emulators.festo:cpx",
-    "festo-vtem": "pneuarm.service.emulators.festo:vtem",
-    "ctrl-p": "pneuarm.service.emulators.serial:ctrl_p",
-    "esp32": "pneuarm.service.emulators.serial:esp32",
-}
-
-Emulator = Callable[[argparse.Namespace, Configuration], int]
+#: Begins the line after the last line of configuration.
+LAST_LINE = "# faults"
 
 
 def emulate(arguments: argparse.Namespace) -> int:
     """Run one emulator until Ctrl-C or SIGTERM; faults are lines on stdin."""
-    module, _, function = EMULATORS[arguments.what].partition(":")
-    emulator: Emulator = getattr(importlib.import_module(module), function)
-    return emulator(arguments, configuration_of(arguments.arm))
+    device = devices().named(arguments.what)
+    if not isinstance(device, EmulatedDevice):
+        raise InvalidInput(f"device {device.name!r} has no emulator")
+    configuration = configuration_of(arguments.arm)
+    config, arm = configuration.of_device(device), configuration.build_arm()
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    realtime.take_priority(1)  # a real device is not kept waiting by what this machine does
+    emulated = _emulated_arm(arguments, configuration)
+    with device.emulate(config, arm, emulated, arguments) as emulation:
+        print("\n".join(_lines(device, configuration, emulation.table)))
+        print(f"{LAST_LINE}, a line each on stdin: {', '.join(emulation.words)}", flush=True)
+        start_console(emulation.inject, emulation.words)
+        ended.wait()
+    return 0
 
 
-def emulated_arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
+def _emulated_arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
     """Make the arm behind an emulator; raises InvalidInput where its record cannot be kept."""
     try:
         record = None if arguments.record is None else DeviceRecord(arguments.record)
     except OSError as error:
         raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
     return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
+
+
+def _lines(
+    device: AnyDevice, configuration: Configuration, table: Mapping[str, object]
+) -> list[str]:
+    """Return the lines that make a daemon use this emulator, as they stand."""
+    lines = [
+        f"# {device.name} with the arm {configuration.arm.name}; use it with these lines:",
+        f'preset = "{configuration.preset}"',
+        "[hardware]",
+        f'adapter = "{device.name}"',
+    ]
+    if device.left_behind(configuration.of_device(device)):
+        lines.append("accept_no_watchdog = true")
+    # Texts, numbers and lists of them are the same in TOML as in JSON.
+    keys = [f"{key} = {json.dumps(value)}" for key, value in table.items()]
+    return [*lines, f"[{device.table}]", *keys]
 
 
 def configuration_of(arm: str) -> Configuration:

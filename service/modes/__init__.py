@@ -1,1 +1,1 @@
-"""The mode machine: its table, its timers, its events."""
+"""The mode machine: its table, and the timers and events that drive it. Time is an argument."""

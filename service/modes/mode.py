@@ -24,24 +24,33 @@ class Mode(IntEnum):
 
 
 class ModeEvent(IntEnum):
-    """What can happen to a mode."""
+    """What can happen to a mode; ``cause`` says what brings it about."""
 
-    VENTED = 1  # connected, and the measured pressure is near zero
-    ENABLE = 2
-    HOLD = 3
-    VENT = 4
-    RESET = 5
-    ESTOP = 6
-    FAULT = 7
-    TARGET_STALE = 8
-    LEASE_LOST = 9
-    HOLD_TIMEOUT = 10
-    GATEWAY_SILENT = 11
-    GATEWAY_LOST = 12
-    DISK_FULL = 13
-    DISK_STILL_FULL = 14
-    LEASE_RELEASED = 15
-    FAULT_HOLD = 16  # a fault whose policy is to hold
+    cause: str
+
+    def __new__(cls, number: int, cause: str) -> "ModeEvent":
+        """Make an event of its number and its cause."""
+        event = int.__new__(cls, number)
+        event._value_ = number
+        event.cause = cause
+        return event
+
+    VENTED = 1, "every measured pressure below 20 mbar, and the recorder runs"
+    ENABLE = 2, "lease holder"
+    HOLD = 3, "anybody"
+    VENT = 4, "anybody, or the end of the daemon"
+    RESET = 5, "anybody"
+    ESTOP = 6, "anybody"
+    FAULT = 7, "a fault that ramps or vents, see docs/safety.md#faults"
+    TARGET_STALE = 8, "no target for `target_timeout_ms`, none at all for `arming_timeout_s`"
+    LEASE_LOST = 9, "holder gone, or taken over"
+    HOLD_TIMEOUT = 10, "no operator for `hold_timeout_s`"
+    GATEWAY_SILENT = 11, "no heartbeat for 200 ms"
+    GATEWAY_LOST = 12, "no heartbeat for 2 s"
+    DISK_FULL = 13, "the disk takes nothing"
+    DISK_STILL_FULL = 14, "for `full_disk_vent_s`"
+    LEASE_RELEASED = 15, "holder gave it back after following a target"
+    FAULT_HOLD = 16, "a fault that holds, see docs/safety.md#faults"
 
 
 #: Modes without air in the arm: nothing but zeros is sent to the device, in fault after the ramp.

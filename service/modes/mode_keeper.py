@@ -24,18 +24,18 @@ class Timeouts:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What an event says instead of what is usual for its mode event."""
+class Notice:
+    """What an event tells: one word for programs, sentences for people."""
 
     level: "pb.Level"
     code: str
     text: str
-    cause: str
-    remedy: str
+    cause: str = ""
+    remedy: str = ""
 
 
 @dataclass(slots=True)  # made in every tick: freezing it would cost more than all of its use
-class Watched:
+class Conditions:
     """What the keeper looks at once a tick. Ages in seconds; None means there is none."""
 
     target_age_s: float | None
@@ -121,7 +121,7 @@ class ModeKeeper:
                 "directory, or lower log.min_free_mib"
             )
         if reason:
-            self.tell(pb.WARNING, "mode_refused", reason, client=client)
+            self.tell(Notice(pb.WARNING, "mode_refused", reason), client)
         else:
             self.apply(event, now_s, client)
         return reason
@@ -132,9 +132,12 @@ class ModeKeeper:
         now_s: float,
         client: str = "",
         cause: str = "",
-        told: Told | None = None,
+        notice: Notice | None = None,
     ) -> bool:
-        """Apply an event if it means anything now; return whether it did."""
+        """Apply an event if it means anything now; return whether it did.
+
+        A change is told by ``notice``, without one by what is usual for the event.
+        """
         after = next_mode(self.mode, event)
         if after is None:
             return False
@@ -142,72 +145,65 @@ class ModeKeeper:
         self.mode = after
         if changed:
             self._entered_s = now_s
-            if told is not None:
-                self.tell(told.level, told.code, told.text, told.cause, told.remedy, client)
-                return True
-            text, usual_cause, remedy = _TEXTS.get(event, ("fault: the arm vents", "", "reset"))
-            level = pb.WARNING if event in _WARNINGS else pb.INFO
-            level = pb.ERROR if event == ModeEvent.FAULT else level
-            self.tell(level, event.name.lower(), text, cause or usual_cause, remedy, client)
+            self.tell(notice or _usual_notice(event, cause), client)
         return True
 
-    def watch(self, now_s: float, watched: Watched) -> None:
+    def watch(self, now_s: float, now: Conditions) -> None:
         """Let time and the other processes change the mode; in order of urgency."""
-        self._disk = watched.disk
-        if watched.operator:
+        self._disk = now.disk
+        if now.operator:
             self._operator_s = now_s
-        if watched.disk != Disk.FULL:
+        if now.disk != Disk.FULL:
             self._not_full_s = now_s
         in_mode_s = now_s - self._entered_s
-        recording = watched.disk != Disk.STARTING  # nothing moves before it is recorded
+        recording = now.disk != Disk.STARTING  # nothing moves before it is recorded
         if self.mode in (Mode.ACTIVE, Mode.HOLD):
-            if watched.gateway_age_s > GATEWAY_LOST_S:
+            if now.gateway_age_s > GATEWAY_LOST_S:
                 self.apply(ModeEvent.GATEWAY_LOST, now_s)
-            elif watched.gateway_age_s > GATEWAY_SILENT_S:
+            elif now.gateway_age_s > GATEWAY_SILENT_S:
                 self.apply(ModeEvent.GATEWAY_SILENT, now_s)
         if self.mode == Mode.ACTIVE:
-            self._watch_active(now_s, in_mode_s, watched)
+            self._watch_active(now_s, in_mode_s, now)
         elif self.mode == Mode.HOLD:
-            self._watch_hold(now_s, watched)
-        elif self.mode == Mode.IDLE and watched.pressure_near_zero and recording:
+            self._watch_hold(now_s, now)
+        elif self.mode == Mode.IDLE and now.pressure_near_zero and recording:
             self.apply(ModeEvent.VENTED, now_s)
 
-    def _watch_active(self, now_s: float, in_mode_s: float, watched: Watched) -> None:
-        if watched.disk == Disk.FULL:
+    def _watch_active(self, now_s: float, in_mode_s: float, now: Conditions) -> None:
+        if now.disk == Disk.FULL:
             self.apply(ModeEvent.DISK_FULL, now_s)
-        elif watched.target_age_s is None:
+        elif now.target_age_s is None:
             if in_mode_s > self._timeouts.arming_s:
                 self.apply(ModeEvent.TARGET_STALE, now_s)
-        elif watched.target_age_s > self._timeouts.target_s:
+        elif now.target_age_s > self._timeouts.target_s:
             self.apply(ModeEvent.TARGET_STALE, now_s)
 
-    def _watch_hold(self, now_s: float, watched: Watched) -> None:
+    def _watch_hold(self, now_s: float, now: Conditions) -> None:
         full_s = now_s - max(self._entered_s, self._not_full_s)
         alone_s = now_s - max(self._entered_s, self._operator_s)
-        if watched.disk == Disk.FULL and full_s > self._timeouts.full_disk_vent_s:
+        if now.disk == Disk.FULL and full_s > self._timeouts.full_disk_vent_s:
             self.apply(ModeEvent.DISK_STILL_FULL, now_s)
-        elif not watched.operator and alone_s > self._timeouts.hold_s:
+        elif not now.operator and alone_s > self._timeouts.hold_s:
             self.apply(ModeEvent.HOLD_TIMEOUT, now_s)
 
-    def tell(
-        self,
-        level: "pb.Level",
-        code: str,
-        text: str,
-        cause: str = "",
-        remedy: str = "",
-        client: str = "",
-    ) -> None:
+    def tell(self, notice: Notice, client: str = "") -> None:
         """Emit an event; whoever emits it puts the time on it."""
         self._emit(
             pb.Event(
-                level=level,
+                level=notice.level,
                 source="control",
-                code=code,
-                text=text,
-                cause=cause,
-                remedy=remedy,
+                code=notice.code,
+                text=notice.text,
+                cause=notice.cause,
+                remedy=notice.remedy,
                 client_id=client,
                 mode=pb.Mode.Name(self.mode),
             )
         )
+
+
+def _usual_notice(event: ModeEvent, cause: str) -> Notice:
+    text, usual_cause, remedy = _TEXTS.get(event, ("fault: the arm vents", "", "reset"))
+    level = pb.WARNING if event in _WARNINGS else pb.INFO
+    level = pb.ERROR if event == ModeEvent.FAULT else level
+    return Notice(level, event.name.lower(), text, cause or usual_cause, remedy)

@@ -28,14 +28,16 @@ def is_loopback(endpoint: str) -> bool:
 
 def read_config(config_file: str) -> zenoh.Config:
     """Read a Zenoh configuration file, or the defaults; raises ConfigurationError."""
+    config: zenoh.Config = zenoh.Config()
     if not config_file:
-        return zenoh.Config()
+        return config
     if not Path(config_file).is_file():
         raise ConfigurationError(f"zenoh.config_file = {config_file!r}: no such file")
     try:
-        return zenoh.Config.from_file(config_file)
+        config = zenoh.Config.from_file(config_file)
     except zenoh.ZError as error:
         raise ConfigurationError(f"zenoh.config_file = {config_file!r}: {error}") from error
+    return config
 
 
 def check_free(key: str, endpoint: str) -> None:

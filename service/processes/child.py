@@ -13,20 +13,15 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from pneuarm.controllers.arm.errors import PneuarmError
 from pneuarm.service.processes.usage import ProcessTable
 
-#: Module of each process; loaded in the child only, so that the parent stays small.
-MODULES = {
-    "control": "pneuarm.service.control.process",
-    "device": "pneuarm.service.devices.process",
-    "gateway": "pneuarm.service.wire.gateway",
-    "recorder": "pneuarm.service.daemon.recorder",
-    "viewer": "pneuarm.service.daemon.viewer",
-}
 _REVIVE_AFTER_S = 1.0
 
+#: How often somebody who ends a process looks how far it is.
+_LOOK_S = 0.5
 
-def enter(name: str, arguments: tuple[object, ...]) -> None:
+
+def enter(name: str, module: str, arguments: tuple[object, ...]) -> None:
     """Run a process's own `main`; this is what the new interpreter starts with."""
-    main: Callable[..., None] = importlib.import_module(MODULES[name]).main
+    main: Callable[..., None] = importlib.import_module(module).main
     try:
         main(*arguments)
     except PneuarmError as error:
@@ -38,16 +33,20 @@ def enter(name: str, arguments: tuple[object, ...]) -> None:
 
 
 class Child:
-    """One process. The last argument of its `main` is a connection that says when to end."""
+    """One process. The last argument of its `main` is a connection that says when to end.
+
+    Its module is loaded in the child only, so that the parent stays small.
+    """
 
     def __init__(
         self,
         name: str,
+        module: str,
         context: SpawnContext,
         arguments: tuple[object, ...],
         table: ProcessTable,
     ) -> None:
-        self.name = name
+        self.name, self._module = name, module
         self._context, self._arguments, self._table = context, arguments, table
         self._process: SpawnProcess | None = None
         self._end: Connection | None = None
@@ -57,7 +56,7 @@ class Child:
     def start(self) -> None:
         """Start it, or start it again."""
         theirs, self._end = self._context.Pipe(duplex=False)
-        arguments = (self.name, (*self._arguments, theirs))
+        arguments = (self.name, self._module, (*self._arguments, theirs))
         self._process = self._context.Process(target=enter, args=arguments, name=self.name)
         self._start_unheard(self._process)
         theirs.close()
@@ -91,14 +90,22 @@ class Child:
         if self._process is not None:
             self._process.terminate()
 
-    def end(self, patience_s: float) -> bool:
-        """Ask it to end; kill it after the given time. Return whether it ended by itself."""
+    def end(self, patience_s: float, progress: Callable[[], object] = lambda: None) -> bool:
+        """Ask it to end; kill it after the given time. Return whether it ended by itself.
+
+        The time begins anew whenever ``progress``, which says how far it is, says something else.
+        """
         if self._end is not None:
             self._end.close()  # the child reads the end of this pipe as the word
-        if self.join(patience_s):
-            return True
-        self.kill()
-        return False
+        reached, since_s = progress(), time.monotonic()
+        while not self.join(min(_LOOK_S, patience_s)):
+            now, now_s = progress(), time.monotonic()
+            if now != reached:
+                reached, since_s = now, now_s
+            elif now_s - since_s > patience_s:
+                self.kill()
+                return False
+        return True
 
     def join(self, patience_s: float) -> bool:
         """Wait for its end; return whether it came."""

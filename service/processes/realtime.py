@@ -39,6 +39,12 @@ def step_back(nice: int) -> None:
         os.nice(nice)
 
 
+def step_forward(nice: int) -> None:
+    """Go before ordinary programs, where the system allows it."""
+    with contextlib.suppress(OSError):
+        os.nice(-nice)
+
+
 def drop_priority() -> None:
     """Go back to ordinary scheduling."""
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -6,14 +6,24 @@ import json
 import tomllib
 from datetime import UTC, datetime
 
-from pneuarm.controllers.arm.errors import InvalidInput
-from pneuarm.logs.reading.reader import LogReader, LogSummary, summarise
+from pneuarm.controllers.arm.errors import InvalidInput, LogError
+from pneuarm.logs.reading.reader import LogReader
+from pneuarm.logs.reading.summary import LogSummary, summarise
 from pneuarm.service.configuration.configuration import Configuration, check
+
+#: Places that are named; there may be thousands.
+_DAMAGE_LINES = 20
 
 
 def recorded_configuration(reader: LogReader) -> Configuration:
     """Return the configuration with which a log was recorded."""
-    return check(tomllib.loads(reader.info.config_toml), str(reader.parts[0]))
+    path = reader.parts[0]
+    if not reader.info.config_toml:
+        raise LogError(
+            f"{path} lacks the configuration with which it was recorded: every copy in it is "
+            "damaged; its ticks can be read, and replayed with --to zenoh"
+        )
+    return check(tomllib.loads(reader.info.config_toml), str(path))
 
 
 def info(arguments: argparse.Namespace) -> int:
@@ -30,6 +40,8 @@ def _text(summary: LogSummary) -> str:
     start = datetime.fromtimestamp(summary.start_unix_ns / 1e9, UTC)
     seconds = (summary.end_unix_ns - summary.start_unix_ns) * 1e-9
     state = "closed properly" if summary.finished else "broken off (a crash, or still running)"
+    if summary.damage:
+        state = "DAMAGED" if summary.finished else "DAMAGED, and broken off"
     lines = [
         f"log       {summary.path} ({summary.parts} part{'s' * (summary.parts > 1)}, {state})",
         f"arm       {summary.arm}",
@@ -39,7 +51,23 @@ def _text(summary: LogSummary) -> str:
         "messages  " + ", ".join(f"{key} {n}" for key, n in sorted(summary.messages.items())),
         "versions  " + ", ".join(f"{key} {n}" for key, n in sorted(summary.versions.items())),
     ]
-    return "\n".join(lines)
+    return "\n".join(lines + _missing_lines(summary))
+
+
+def _missing_lines(summary: LogSummary) -> list[str]:
+    """Say what cannot be read: one line a place, and what the file says stood there."""
+    lines = []
+    if summary.lost:
+        lost = ", ".join(f"{key} {n}" for key, n in sorted(summary.lost.items()))
+        lines.append(f"lost      {lost}: in the file, and not readable")
+    lines += [f"damage    {text}" for text in summary.damage[:_DAMAGE_LINES]]
+    if len(summary.damage) > _DAMAGE_LINES:
+        lines.append(f"damage    at {len(summary.damage) - _DAMAGE_LINES} more places")
+    if summary.cut_bytes:
+        lines.append(f"end       {summary.cut_bytes} bytes of an unfinished chunk")
+    if summary.damage and not summary.finished:
+        lines.append("end       unknown: the file does not say how many ticks came behind the last")
+    return lines
 
 
 def replay(arguments: argparse.Namespace) -> int:

@@ -13,6 +13,7 @@ from pneuarm.logs.view.view import View
 from pneuarm.service.configuration.configuration import Configuration, rerun_url
 from pneuarm.service.daemon.viewer import has_display, open_viewer, start_server
 from pneuarm.service.network.sessions import check_free
+from pneuarm.service.replay.telling import say, say_damage
 
 #: The view gets ticks in batches of this many seconds, as the live one does.
 _BATCH_S = 1.0 / 30.0
@@ -32,6 +33,7 @@ def replay_in_rerun(
         print(f"replaying {reader.parts[0]} at speed {speed:g}; see it with: rerun --connect {url}")
         for number in count(1):
             _round(reader, configuration, speed, number)
+            say_damage(reader)
             if not loop:
                 break
         print("the end of the log; the scene stays until Ctrl-C", flush=True)
@@ -57,7 +59,7 @@ def _round(reader: LogReader, configuration: Configuration, speed: float, number
 def _show(reader: LogReader, view: View, speed: float) -> None:
     batch: list[pb.ArmState] = []
     shown_s = time.monotonic()
-    for entry in paced(reader, speed, False, time.monotonic, time.sleep):
+    for entry in paced(reader, speed, False, time.monotonic, time.sleep, say):
         if isinstance(entry.message, pb.Event):
             view.event(entry.message)
         elif isinstance(entry.message, pb.ArmState):

@@ -1,4 +1,4 @@
-"""A recorded session over Zenoh: states, tip, tf, health and events with their timing."""
+"""A recorded session over Zenoh: everything that a daemon publishes, with its timing."""
 
 import time
 
@@ -7,10 +7,11 @@ import zenoh
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.replay import paced
 from pneuarm.logs.schema.codec import encoding_of
-from pneuarm.logs.schema.topics import ALIVE_DAEMON, EVENT, HEALTH, STATE, TF, TIP, full_key
+from pneuarm.logs.schema.topics import ALIVE_DAEMON, TOPICS, full_key
 from pneuarm.service.network import sessions as network
+from pneuarm.service.replay.telling import say, say_damage
 
-_OUT = (STATE, TIP, TF, HEALTH, EVENT)
+_OUT = tuple(topic for topic in TOPICS if topic.direction == "out")
 
 
 def replay_over_zenoh(reader: LogReader, speed: float, loop: bool, listen: str) -> int:
@@ -28,7 +29,7 @@ def replay_over_zenoh(reader: LogReader, speed: float, loop: bool, listen: str) 
         token = session.liveliness().declare_token(full_key(arm, ALIVE_DAEMON))
         print(f"replaying {reader.parts[0]} at speed {speed:g} on {listen}", flush=True)
         shown_ns: dict[str, int] = {}
-        for entry in paced(reader, speed, loop, time.monotonic, time.sleep):
+        for entry in paced(reader, speed, loop, time.monotonic, time.sleep, say):
             topic = entry.topic
             if topic not in _OUT:
                 continue
@@ -39,6 +40,7 @@ def replay_over_zenoh(reader: LogReader, speed: float, loop: bool, listen: str) 
                 shown_ns[topic.key] = entry.time_unix_ns
             message = entry.message
             publishers[topic.key].put(message.SerializeToString(), encoding=encoding_of(message))
+        say_damage(reader)
         token.undeclare()
     finally:
         session.close()

@@ -1,1 +1,1 @@
-"""What counts as a fault, and what follows."""
+"""What counts as a fault, and what follows: monitors, the table of faults, the ramp. Pure."""

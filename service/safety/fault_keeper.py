@@ -2,7 +2,7 @@
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.modes.mode import ModeEvent
-from pneuarm.service.modes.mode_keeper import ModeKeeper, Told
+from pneuarm.service.modes.mode_keeper import ModeKeeper, Notice
 from pneuarm.service.safety.faults import EVENTS, FAULTS, Fault, FaultCode, Policy
 
 #: A warning that lasts is told again after this long, and nothing sooner, however it flickers.
@@ -26,6 +26,8 @@ class FaultKeeper:
     @property
     def bits(self) -> int:
         """The active faults as bits on the wire."""
+        if not self._failed and not self._seen:
+            return 0
         return sum(1 << code for code in self.active)
 
     def seen(self, found: dict[FaultCode, str], now_s: float) -> None:
@@ -51,17 +53,17 @@ class FaultKeeper:
         """Change the mode as the policy says; tell it once, with the change or without."""
         fault = FAULTS[code]
         event = EVENTS[fault.policy]
-        told = _told(code, fault, what)
+        notice = _notice(code, fault, what)
         before = self._keeper.mode
         if event is not None:
-            self._keeper.apply(event, now_s, told=told)
+            self._keeper.apply(event, now_s, notice=notice)
         if self._keeper.mode != before:
             self._told_s[code] = now_s
         elif now_s - self._told_s.get(code, -REPEAT_S) >= REPEAT_S and (
             not again or fault.policy == Policy.WARN
         ):
             self._told_s[code] = now_s
-            self._keeper.tell(told.level, told.code, told.text, told.cause, told.remedy)
+            self._keeper.tell(notice)
 
     def why_not(self, event: ModeEvent) -> str:
         """Say what still forbids to enable or to reset, or return an empty string."""
@@ -84,8 +86,8 @@ class FaultKeeper:
         return max((FAULTS[code].policy for code in self.active), default=Policy.WARN)
 
 
-def _told(code: FaultCode, fault: Fault, what: str) -> Told:
+def _notice(code: FaultCode, fault: Fault, what: str) -> Notice:
     serious = fault.policy >= Policy.RAMP
     level = pb.ERROR if serious else pb.WARNING
     text = f"{fault.cause}; {fault.consequence}"
-    return Told(level, code.name.lower(), text, what, fault.remedy)
+    return Notice(level, code.name.lower(), text, what, fault.remedy)

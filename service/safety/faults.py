@@ -1,6 +1,6 @@
 """Every fault in one table: what it means, what the arm does about it, and what to do then.
 
-docs/safety.md has the same table for people; a test compares the two.
+`make docs` writes the table of docs/safety.md from this one.
 """
 
 from dataclasses import dataclass

@@ -2,17 +2,15 @@
 
 import math
 
-import numpy as np
-
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.interface import Measurement
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.modes.mode_keeper import ModeKeeper
 from pneuarm.service.processes.pipe import SetTipPose
 from pneuarm.service.safety.fault_keeper import FaultKeeper
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 from pneuarm.service.safety.monitors.tip_model import TipModel
 from pneuarm.service.safety.monitors.watch import Watch
 from pneuarm.service.safety.ramp import Ramp
@@ -38,13 +36,14 @@ class Safety:
     def look(
         self,
         measurement: Measurement,
-        tick: np.ndarray,
-        tip_pose: SetTipPose | None,
         sent_pa: Array,
+        estimated_m: Array,
+        tip_pose: SetTipPose | None,
+        overruns: int,
         now_ns: int,
         dt_s: float,
     ) -> None:
-        """Look at this tick's measurement; ``tick`` and ``sent_pa`` are still those before it."""
+        """Look at this tick's measurement, and at what was sent and estimated in the one before."""
         now_s, before = now_ns * 1e-9, self._keeper.mode
         tip_error_m = math.nan
         if tip_pose is not None:
@@ -52,14 +51,7 @@ class Safety:
                 tip_pose.position_m, tip_pose.received_ns, measurement.pressures_pa, now_ns
             )
         found = self._watch.look(
-            measurement,
-            sent_pa,
-            tick["length_estimated_m"],
-            tip_error_m,
-            before,
-            now_s,
-            dt_s,
-            int(tick["overruns"]),
+            measurement, sent_pa, estimated_m, tip_error_m, before, now_s, dt_s, overruns
         )
         self._faults.seen(found, now_s)
         if self._keeper.mode != Mode.FAULT:

@@ -1,1 +1,1 @@
-"""The daemon as a service of systemd."""
+"""`pneuarm systemd`: the unit file that makes the daemon a service."""

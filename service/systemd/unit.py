@@ -9,8 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.hardware.device import SerialPort
 from pneuarm.service.configuration.configuration import Configuration, load
-from pneuarm.service.devices.access import serial_paths
+from pneuarm.service.devices import registry as backends
 
 
 def systemd(arguments: argparse.Namespace) -> int:
@@ -33,9 +34,11 @@ def unit_text(configuration: Configuration, path: Path | None, user: str) -> str
     """Return the unit file for a configuration file, or for its built-in arm."""
     what = [str(path.resolve())] if path else ["--arm", configuration.preset]
     command = [sys.executable, "-m", "pneuarm", "run", *what]
-    own = [f"DeviceAllow={_escaped(device)} rw" for device in serial_paths(configuration)]
-    if own:
-        own.append(f"SupplementaryGroups={_group(serial_paths(configuration)[0])}")
+    own: list[str] = []
+    where = backends.location(configuration)
+    if isinstance(where, SerialPort) and where.path:
+        own = [f"DeviceAllow={_escaped(where.path)} rw"]
+        own.append(f"SupplementaryGroups={_group(where.path)}")
     if configuration.log.directory:
         directory = Path(configuration.log.directory).expanduser().resolve()
         own.append(f"ReadWritePaths={_quoted(f'-{directory}')}")

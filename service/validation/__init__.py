@@ -1,1 +1,1 @@
-"""The figures of the validation: the paper's table 1, gravity, the models side by side."""
+"""`pneuarm validate table1`: the arm of table 1 identified, computed without and with gravity."""

@@ -22,7 +22,7 @@ from scipy.optimize import least_squares
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.controllers.kinematics.constant_curvature import section_inverse
-from pneuarm.service.validation.table1 import BAR, MM, IdentifiedArm, Table, identify
+from pneuarm.service.validation.table1 import BAR, MM, IdentifiedArm, PrintedTable, identify
 
 _NODES = 21
 _TOLERANCE = 1e-10
@@ -87,7 +87,7 @@ def predict(fit: GravityFit, arm: IdentifiedArm, pressures_pa: Array) -> Array:
     )
 
 
-def fit_rows(table: Table, arm: IdentifiedArm, rows: list[int]) -> GravityFit:
+def fit_rows(table: PrintedTable, arm: IdentifiedArm, rows: list[int]) -> GravityFit:
     """Fit the two numbers to the measured positions of ``rows``, least squares in millimetres.
 
     Raises InvalidInput for no rows or one that the table does not have.
@@ -106,7 +106,7 @@ def fit_rows(table: Table, arm: IdentifiedArm, rows: list[int]) -> GravityFit:
     return GravityFit(float(weight), float(zero))
 
 
-def measured_m(table: Table) -> Array:
+def measured_m(table: PrintedTable) -> Array:
     """Measured tips (n, 2), m."""
     return np.stack([table.column("y_measured_mm", MM), table.column("z_measured_mm", MM)], -1)
 
@@ -119,12 +119,12 @@ class CrossValidation:
     predicted_m: Array
     all_rows: GravityFit
 
-    def errors_percent(self, table: Table) -> Array:
+    def errors_percent(self, table: PrintedTable) -> Array:
         """Deviation (n, 2) of the measured from the predicted, percent of the predicted."""
         return np.asarray(100.0 * (measured_m(table) / self.predicted_m - 1.0))
 
 
-def cross_validate(table: Table) -> CrossValidation:
+def cross_validate(table: PrintedTable) -> CrossValidation:
     """Fit on all rows but one and predict that one, in turn."""
     arm = identify(table)
     pressures = table.column("pressure_bar", BAR)

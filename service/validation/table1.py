@@ -37,7 +37,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Table:
+class PrintedTable:
     """Its rows as printed: a Decimal keeps the digits, ``(n_rows,)`` a column."""
 
     printed: dict[str, tuple[Decimal, ...]]
@@ -97,7 +97,7 @@ class IdentifiedArm:
         return tips[:, [0, 2]]
 
 
-def read_table(path: Path | None = None) -> Table:
+def read_table(path: Path | None = None) -> PrintedTable:
     """Read table 1, the packaged one or a file like it.
 
     Raises ConfigurationError for a file that cannot be read, other columns, a value that is no
@@ -119,7 +119,7 @@ def read_table(path: Path | None = None) -> Table:
                 f"{source}: row {index + 1} has more values than the {len(COLUMNS)} columns"
             )
     number = _reader(str(source))
-    return Table(
+    return PrintedTable(
         {name: tuple(number(i, name, row[name]) for i, row in enumerate(rows)) for name in COLUMNS}
     )
 
@@ -139,7 +139,7 @@ def _reader(where: str) -> Callable[[int, str, str | None], Decimal]:
     return number
 
 
-def identify(table: Table) -> IdentifiedArm:
+def identify(table: PrintedTable) -> IdentifiedArm:
     """Identify the arm from the constant-curvature columns, see the module's text."""
     y, z = table.column("y_cc_mm", MM), table.column("z_cc_mm", MM)
     length, theta, _ = section_inverse(np.stack([y, 0.0 * y, z], axis=-1)).T

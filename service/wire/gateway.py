@@ -14,7 +14,7 @@ from typing import cast
 
 import zenoh
 
-from pneuarm.controllers.arm.errors import LeaseRefused, TargetRejected
+from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode, encode, encoding_of, is_json
 from pneuarm.logs.schema.topics import (
@@ -123,17 +123,16 @@ class Gateway:
         try:
             request = decode(pb.ModeRequest, payload, encoding)
             self._handle(request, query, encoding)
-        except (TargetRejected, LeaseRefused) as error:
-            self._notes.reject(MODE.key, str(error), b"", request.client_id)
-            reply = pb.Reply(accepted=False, reason=str(error), lease_holder=self._lease.holder)
-            reply.mode = self._publisher.newest_mode
-            self._reply(query, reply, encoding)
+        except (MessageRejected, LeaseRefused) as error:
+            self._notes.reject(MODE.key, str(error), request.client_id)
+            refusal = pb.LEASE_REFUSED if isinstance(error, LeaseRefused) else pb.BAD_REQUEST
+            self._reply(query, self._state_reply(refusal, str(error), ""), encoding)
 
     def _handle(self, request: pb.ModeRequest, query: zenoh.Query, encoding: str) -> None:
         now_s = time.monotonic()
         secret = request.lease_secret
         if len(request.client_id) > 64:
-            raise TargetRejected(
+            raise MessageRejected(
                 f"client_id has {len(request.client_id)} characters; at most 64 are allowed"
             )
         with self._lock:
@@ -150,10 +149,10 @@ class Gateway:
         if event is not None:
             self._request(event, request.client_id, (query, encoding, secret))
         elif request.action in (pb.TAKE_LEASE, pb.RELEASE_LEASE):
-            self._reply(query, self._state_reply(True, "", secret), encoding)
+            self._reply(query, self._state_reply(pb.NOT_REFUSED, "", secret), encoding)
         else:
             names = ", ".join(pb.Action.keys()[1:])
-            raise TargetRejected(f"action = {request.action}: missing or unknown; one of {names}")
+            raise MessageRejected(f"action = {request.action}: missing or unknown; one of {names}")
 
     def _request(
         self, event: ModeEvent, client: str, asked: tuple[zenoh.Query, str, str] | None = None
@@ -167,13 +166,14 @@ class Gateway:
             if not sent and asked is not None:
                 del self._pending[number]
         if not sent and asked is not None:
-            refusal = self._state_reply(False, "the control process does not answer", asked[2])
-            self._reply(asked[0], refusal, asked[1])
+            reason = "the control process does not answer"
+            self._reply(asked[0], self._state_reply(pb.MODE_REFUSED, reason, asked[2]), asked[1])
         return number
 
-    def _state_reply(self, accepted: bool, reason: str, secret: str) -> pb.Reply:
+    def _state_reply(self, refusal: "pb.Refusal", reason: str, secret: str) -> pb.Reply:
         return pb.Reply(
-            accepted=accepted,
+            accepted=refusal == pb.NOT_REFUSED,
+            refusal=refusal,
             reason=reason,
             lease_secret=secret,
             lease_holder=self._lease.holder,
@@ -195,7 +195,8 @@ class Gateway:
         if asked is None:
             return
         query, encoding, secret = asked
-        message = self._state_reply(reply.accepted, reply.reason, secret)
+        refusal = pb.NOT_REFUSED if reply.accepted else pb.MODE_REFUSED
+        message = self._state_reply(refusal, reply.reason, secret)
         message.mode = cast("pb.Mode", int(reply.mode))
         message.state_sequence = reply.sequence
         self._publisher.newest_mode = message.mode

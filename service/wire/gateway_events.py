@@ -31,16 +31,25 @@ class Notes:
         with self.lock:
             self._messages.write(topic, message, self._shared.unix_ns(monotonic_ns))
 
-    def reject(self, key: str, reason: str, payload: bytes, client: str) -> None:
+    def reject(
+        self, key: str, reason: str, client: str, payload: bytes = b"", target_sequence: int = 0
+    ) -> None:
         """Tell why a message changed nothing."""
-        shown = self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES]
+        event = self._warning("rejected", f"{key}: {reason}", client)
+        event.key, event.target_sequence = key, target_sequence
+        event.payload = self._lease.redacted(payload)[:_SHOWN_PAYLOAD_BYTES]
         with self.lock:
             self.rejected += 1
-            self.tell("rejected", f"{key}: {reason}", client, shown)
+            self._messages.write(EVENT, event, event.time_unix_ns)
 
-    def tell(self, code: str, text: str, client: str, payload: bytes = b"") -> None:
+    def tell(self, code: str, text: str, client: str) -> None:
         """Write down a warning, for everybody to read."""
-        event = pb.Event(
+        event = self._warning(code, text, client)
+        with self.lock:
+            self._messages.write(EVENT, event, event.time_unix_ns)
+
+    def _warning(self, code: str, text: str, client: str) -> pb.Event:
+        return pb.Event(
             time_unix_ns=self._shared.unix_ns(time.monotonic_ns()),
             level=pb.WARNING,
             source="gateway",
@@ -48,7 +57,4 @@ class Notes:
             text=text[:400],
             client_id=client[:64],
             mode=self._publisher.newest_mode,
-            payload=payload,
         )
-        with self.lock:
-            self._messages.write(EVENT, event, event.time_unix_ns)

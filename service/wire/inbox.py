@@ -8,7 +8,8 @@ import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
+from pneuarm.controllers.limits.limits import names, workspace_is_exact
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 from pneuarm.controllers.workspace.reachability import Reachability
 from pneuarm.controllers.workspace.workspace import Workspace
@@ -43,7 +44,7 @@ class Inbox:
         self._checker = TargetChecker(arm, frames, configuration.reference.limits())
         self._publisher_of_poses = PosePublisher()
         # With keep-outs the workspace has holes that it does not know; of a tool it knows nothing.
-        known = arm.n_sections == 1 and not arm.keep_outs and not any(arm.tool_m)
+        known = workspace_is_exact(arm)
         self._workspace = Workspace(arm) if known else None
         self._out_of_reach = False
         self._nearest: tuple[Array, Reachability] | None = None
@@ -67,8 +68,8 @@ class Inbox:
                 self._check_active()
             told = self._towards_nearest(target, message.client_id, received_ns)
             self._stream.send(SetTarget(told, message.sequence, received_ns))
-        except TargetRejected as error:
-            self._notes.reject(TARGET.key, str(error), payload, message.client_id)
+        except MessageRejected as error:
+            self._notes.reject(TARGET.key, str(error), message.client_id, payload, message.sequence)
             return
         message.lease_secret = ""  # the log is no place for it
         self._notes.log(TARGET, message, received_ns)
@@ -98,11 +99,11 @@ class Inbox:
         return replace(target, nearest_lengths_m=lengths)
 
     def _tell_out_of_reach(self, answer: Reachability, client: str) -> None:
-        names = " and ".join(flag.name.lower() for flag in answer.limits if flag.name)
+        binding = " and ".join(names(answer.limits))
         nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
         self._notes.tell(
             "out_of_reach",
-            f"the target is out of reach: {names} binds; the nearest reachable point is "
+            f"the target is out of reach: {binding} binds; the nearest reachable point is "
             f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
             client,
         )
@@ -137,8 +138,8 @@ class Inbox:
             message = decode(PoseInFrame, payload, str(sample.encoding))
             self._publisher_of_poses.check(sample, message, received_ns * 1e-9)
             position, quaternion = self._checker.tip_pose(message)
-        except TargetRejected as error:
-            self._notes.reject(TIP_POSE.key, str(error), payload, "")
+        except MessageRejected as error:
+            self._notes.reject(TIP_POSE.key, str(error), "", payload)
             return
         self._stream.send(SetTipPose(position, quaternion, received_ns))
         self._notes.log(TIP_POSE, message, received_ns)

@@ -3,7 +3,7 @@
 import secrets
 from dataclasses import dataclass
 
-from pneuarm.controllers.arm.errors import LeaseRefused, TargetRejected
+from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected, TargetRejected
 
 
 @dataclass
@@ -45,7 +45,9 @@ class Lease:
         the timeout has lost it. Raises LeaseRefused with the holder's name.
         """
         if not client or len(client) > 64:
-            raise LeaseRefused("client_id must have 1 to 64 characters, to name who holds the arm")
+            raise MessageRejected(
+                "client_id must have 1 to 64 characters, to name who holds the arm"
+            )
         held = self._holder
         if held is not None and held.client == client and held.secret == secret:
             held.heard_s = now_s

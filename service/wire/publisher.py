@@ -14,12 +14,13 @@ from pneuarm.logs.rings.rings import MessageReader
 from pneuarm.logs.rings.tick import state_from_tick, tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encode, encoding_of, is_json
-from pneuarm.logs.schema.topics import EVENT, HEALTH, STATE, TF, TIP, Topic, full_key
+from pneuarm.logs.schema.topics import EVENT, HEALTH, STATE, TF, TIP, TOPICS, Topic, full_key
 from pneuarm.service.processes.shared import Shared
 from pneuarm.service.processes.usage import ProcessUsage
 
 _HEALTH_S = 1.0
-_LATEST = (STATE, TIP, TF, HEALTH)
+#: What the newest message of also answers queries.
+_LATEST = tuple(topic for topic in TOPICS if topic.newest)
 
 
 class Publisher:

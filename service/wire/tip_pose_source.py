@@ -3,7 +3,7 @@
 import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected
 
 #: A publisher not heard for this long (s) may be replaced by another.
 SILENT_S = 1.0
@@ -22,7 +22,7 @@ class PosePublisher:
         self._stamp_ns = 0
 
     def check(self, sample: zenoh.Sample, message: PoseInFrame, now_s: float) -> None:
-        """Raise TargetRejected for a pose of a second publisher, or one older than the last."""
+        """Raise MessageRejected for a pose of a second publisher, or one older than the last."""
         info = sample.source_info
         source = "" if info is None else f"{info.source_id.zid}/{info.source_id.eid}"
         stamp_ns = message.timestamp.ToNanoseconds() if message.HasField("timestamp") else 0
@@ -32,13 +32,13 @@ class PosePublisher:
         """As :meth:`check`, from plain values; a stamp of 0 is none."""
         silent = now_s - self._heard_s > SILENT_S
         if not silent and source != self._source:
-            raise TargetRejected(
+            raise MessageRejected(
                 f"the tip pose comes from a second publisher ({source or 'without a name'}); only "
                 "one may publish it: end the other, and this one is taken after "
                 f"{SILENT_S:g} s of silence"
             )
         if not silent and stamp_ns and stamp_ns <= self._stamp_ns:
-            raise TargetRejected(
+            raise MessageRejected(
                 "the tip pose is not newer than the one before: its time stamp is "
                 f"{(self._stamp_ns - stamp_ns) * 1e-9:.3g} s behind; is there a second publisher?"
             )

@@ -1,1 +1,1 @@
-"""`pneuarm workspace`: the workspace as files, pictures and a scene."""
+"""`pneuarm workspace`: where the tip can be, as figures, files and pictures. No daemon."""

@@ -11,6 +11,7 @@ from pneuarm.controllers.actuation.pressure_map import length_bounds_m, pressure
 from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.controllers.workspace.summary import Summary, summarise
+from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.configuration.configuration import load
 
 _MM, _LITRES = 1e3, 1e3
@@ -19,6 +20,8 @@ _MM, _LITRES = 1e3, 1e3
 def workspace(arguments: argparse.Namespace) -> int:
     """Compute, write the files, print the table."""
     arm = load(preset=arguments.arm).build_arm()
+    if arguments.out is not None:
+        pyplot()  # said before a minute of computing
     summary = summarise(arm, arguments.samples, arguments.seed)
     files = [] if arguments.out is None else _write(arguments.out, summary)
     if arguments.json:

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
@@ -12,6 +11,7 @@ from pneuarm.controllers.workspace.sampling import Samples, samples_of
 from pneuarm.controllers.workspace.summary import Summary
 from pneuarm.logs.view import colors as colors
 from pneuarm.logs.view.geometry import ArmShape
+from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.workspace.poses import typical_lengths
 
 _MM = 1e3
@@ -21,10 +21,7 @@ _GRID = 220
 
 def write_png(path: Path, summary: Summary) -> None:
     """Draw the arms inside the workspace, and beside it the manipulability; both from the side."""
-    matplotlib.use("Agg")  # no display is needed
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(
+    figure, (left, right) = pyplot().subplots(
         1, 2, figsize=(15, 7.5), layout="constrained", sharex=True, sharey=True
     )
     for axes in (left, right):
@@ -35,7 +32,7 @@ def write_png(path: Path, summary: Summary) -> None:
         _frame(axes, summary)
     figure.suptitle(_title(summary))
     figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    pyplot().close(figure)
 
 
 def _title(summary: Summary) -> str:

@@ -31,13 +31,16 @@ from pneuarm.hardware.festo_vtem.protocol import (
     app_and_state,
 )
 from pneuarm.hardware.transports.modbus import (
+    ModbusRefusal,
+    ModbusTerminal,
     from_signed,
     milliseconds_to_registers,
     runs,
     to_signed,
 )
-from tests.hardware.contract import ARMS
-from tests.hardware.festo_bench import WATCHDOG, Served, cpx_settings, vtem_settings
+from pneuarm.hardware.transports.modbus_server import ServedTerminal
+from tests.hardware.arms import ARMS
+from tests.hardware.festo_bench import WATCHDOG, cpx_settings, vtem_settings
 
 PAPER = ARMS["paper"]
 LAYOUT = CpxLayout((0, 1, 2))
@@ -98,9 +101,9 @@ def test_the_words_of_a_vtem_are_those_of_the_public_driver() -> None:
 @contextmanager
 def cpx(
     watchdog: TerminalWatchdog = WATCHDOG, hold: bool = False
-) -> Iterator[tuple[FestoCpx, Served, EmulatedArm]]:
+) -> Iterator[tuple[FestoCpx, ServedTerminal, EmulatedArm]]:
     arm = EmulatedArm(PAPER, 0)
-    with Served(EmulatedCpx(arm, LAYOUT, watchdog, hold)) as served:
+    with ServedTerminal(EmulatedCpx(arm, LAYOUT, watchdog, hold)) as served:
         adapter = FestoCpx(PAPER, cpx_settings(served.port, LAYOUT, watchdog))
         yield adapter, served, arm
         adapter.close()
@@ -115,7 +118,7 @@ def test_a_setpoint_of_somebody_else_is_a_fault() -> None:
         other.connect()
         ours.read(0.0)
         ours.read(0.0)  # it may only be late
-        with pytest.raises(HardwareError, match=r"valve 0 holds the setpoint 0 mbar, but 200"):
+        with pytest.raises(HardwareError, match=r"valve 0 .*\b0 mbar.*\b200 mbar"):
             ours.read(0.0)
         other.close()
 
@@ -131,7 +134,10 @@ def test_a_setpoint_that_shows_late_is_none() -> None:
 
 def test_a_terminal_that_would_trap_the_air_is_refused_where_it_shows_it() -> None:
     shown = TerminalWatchdog(46100, 1, 200, failsafe_register=46101)
-    with cpx(shown, hold=True) as (ours, _, _), pytest.raises(HardwareError, match="hold last"):
+    with (
+        cpx(shown, hold=True) as (ours, _, _),
+        pytest.raises(HardwareError, match=r"festo_cpx.* 1 .*46101"),
+    ):
         ours.connect()
     with cpx(shown) as (ours, _, _):
         ours.connect()
@@ -164,7 +170,7 @@ def vtem() -> Iterator[tuple[FestoVtem, EmulatedVtem, list[float]]]:
         time.sleep(0.1 * seconds)
 
     terminal = EmulatedVtem(EmulatedArm(PAPER, 0), layout, WATCHDOG)
-    with Served(terminal) as served:
+    with ServedTerminal(terminal) as served:
         adapter = FestoVtem(PAPER, vtem_settings(served.port, layout), sleep)
         yield adapter, terminal, slept
         adapter.close()
@@ -188,9 +194,25 @@ def test_a_slot_that_stops_or_never_starts_is_named() -> None:
     with vtem() as (adapter, terminal, _):
         adapter.connect()
         terminal._slots[1].app = 5
-        with pytest.raises(HardwareError, match=r"slot 1 has left pressure regulation"):
+        with pytest.raises(HardwareError, match=r"slot 1 .*app 5"):
             adapter.read(0.0)
         adapter.close()
         terminal._slots[0].command = lambda *_: None  # type: ignore[method-assign]
-        with pytest.raises(HardwareError, match=r"slot 0 does not regulate pressure after 3 s"):
+        with pytest.raises(HardwareError, match=r"slot 0 .* 3 s"):
             adapter.connect()
+
+
+def test_only_a_missing_register_is_blamed_on_the_wiring() -> None:
+    arm = EmulatedArm(PAPER, 0)
+    with ServedTerminal(EmulatedCpx(arm, LAYOUT, WATCHDOG)) as served:
+        wrong = FestoCpx(PAPER, cpx_settings(served.port, CpxLayout((0, 1, 2), input_base=100)))
+        with pytest.raises(HardwareError, match=r"festo_cpx\.input_base = 100"):
+            wrong.connect()
+        terminal = ModbusTerminal("festo_cpx", "127.0.0.1", served.port, 1, 0.5)
+        terminal.connect()
+        served.inject("exception 1")
+        with pytest.raises(ModbusRefusal) as raised:
+            terminal.read_wired(LAYOUT.input_block, "three valves")
+        terminal.close()
+    assert raised.value.code == 6
+    assert "three valves" not in str(raised.value)

@@ -20,8 +20,6 @@ ZEROS = np.zeros((1, 3))
 class Device:
     """A device that takes whole steps and writes down what it was told."""
 
-    has_watchdog = True
-
     def __init__(self, step_pa: float) -> None:
         self.step_pa = step_pa
         self.told: list[Array] = []

@@ -13,6 +13,7 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from pneuarm.controllers.calibration.calibrate import calibrate
 from pneuarm.controllers.calibration.plan import plan
 from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.controllers.calibration.worth import held_out_mean_m
-from pneuarm.controllers.geometry.frames import rotation_from_vector
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.service.calibration.files import calibrated
 from pneuarm.service.calibration.simulated import record_simulated
@@ -97,6 +98,10 @@ def _arm(key: str, value: Callable[[Any], Any]) -> Change:
     return change
 
 
+def _times(factor: float, value: Any) -> Any:
+    return factor * value if isinstance(value, float) else [factor * each for each in value]
+
+
 def cases(seeds: int) -> Iterator[Case]:
     """Every case, the right configuration first."""
     yield Case("right")
@@ -108,11 +113,9 @@ def cases(seeds: int) -> Iterator[Case]:
         for factor in (0.1, 10.0):
             yield Case(f"response.{key} x {factor:g}", _response(key, factor))
     for factor in (0.1, 10.0):
-        yield Case(f"mass_kg x {factor:g}", _arm("mass_kg", lambda m, by=factor: by * m))
-        yield Case(
-            f"gravity_m_s2 x {factor:g}",
-            _arm("gravity_m_s2", lambda g, by=factor: [by * each for each in g]),
-        )
+        times = partial(_times, factor)
+        yield Case(f"mass_kg x {factor:g}", _arm("mass_kg", times))
+        yield Case(f"gravity_m_s2 x {factor:g}", _arm("gravity_m_s2", times))
     yield Case("gravity the other way", _arm("gravity_m_s2", lambda g: [-each for each in g]))
     yield Case("gravity sideways", _arm("gravity_m_s2", lambda g: [g[2], g[0], g[1]]))
     for order in _ORDERS:
@@ -150,7 +153,6 @@ class _Exchanged:
     def __init__(self, device: Hardware, order: tuple[int, ...]) -> None:
         self._device, self._order = device, list(order)
         self._back = np.argsort(self._order)
-        self.has_watchdog = device.has_watchdog
 
     def connect(self) -> None:
         self._device.connect()

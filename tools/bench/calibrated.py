@@ -1,6 +1,6 @@
 """How near the tip comes to its target without feedback, before and after a calibration.
 
-    .venv/bin/python tools/bench/calibrated.py --json
+    .venv/bin/python -m tools.bench.calibrated --json
 
 The real loop and the simulated arm, in simulated time. A calibration goes through the plan of
 `pneuarm calibrate`, with the true tip plus noise of 0.1 mm as what motion capture would measure.
@@ -11,17 +11,13 @@ Then random position targets within reach, 3 s each, and the mean of the true ti
 import argparse
 import json
 import math
-import sys
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Reach
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import PositionTarget
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
@@ -57,7 +53,7 @@ def tip_errors_percent(configuration: Configuration, targets: Array) -> Array:
         if newest["reach"] != Reach.REACHED:
             raise RuntimeError(f"target {position_m} m is not reached by the commanded arm")
         tip = ticks["tip_true_position_m"].mean(axis=0)
-        errors.append(100.0 * np.linalg.norm(tip - position_m) / length_m)
+        errors.append(float(100.0 * np.linalg.norm(tip - position_m) / length_m))
     return np.array(errors)
 
 

@@ -1,8 +1,8 @@
 """How long one whole step of the inverse kinematics takes, beside its peers, on one core.
 
     make bench-setup
-    .venv/bin/python tools/bench/ik.py --json
-    .venv/bin/python tools/bench/ik.py --reach --json     # the campaign of tools/bench/reach.py too
+    .venv/bin/python -m tools.bench.ik --json
+    .venv/bin/python -m tools.bench.ik --reach --json     # the campaign of tools/bench/reach.py too
 
 A step is what the loop calls: error, Jacobian, QP, solution, exact checks, verdict, by
 ``Controller.step``. Two motions: ``ik_us`` between random reachable positions, where most QPs are
@@ -17,17 +17,15 @@ import platform
 import statistics
 import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.targets.targets import PositionTarget
+from tools.bench.ik_peers import peers_us
 from tools.rig.arms import paper_arm, random_lengths
 
 DT_S = 1e-3
@@ -62,7 +60,7 @@ class Candidate:
     def run(self, targets: int) -> None:
         """Time every step of some motions."""
         step, clock = self._controller.step, time.perf_counter
-        solver = self._controller._motion.qp_ik._solver
+        solver = self._controller._chambers.qp_ik._solver
         for _ in range(targets):
             self._controller.set_target(self._target())
             if self._far:  # on the way there, untimed
@@ -85,11 +83,9 @@ class Candidate:
 def peers() -> dict[str, float] | None:
     """Medians of the peers, once; None where their packages are missing."""
     try:
-        from tools.bench.ik_peers import peers_us  # type: ignore[import-not-found]
-    except ImportError:
+        return peers_us()
+    except ModuleNotFoundError:
         return None
-    found: dict[str, float] = peers_us()
-    return found or None
 
 
 def figures(rounds: int) -> dict[str, object]:

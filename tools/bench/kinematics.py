@@ -1,7 +1,7 @@
 """How fast the kinematics is, beside soromox compiled by JAX, in one process and on one core.
 
     make bench-setup
-    .venv/bin/python tools/bench/kinematics.py --json
+    .venv/bin/python -m tools.bench.kinematics --json
 
 A single call is timed by the wall clock, a batch by processor time, so that other work on the
 machine disturbs it little. Every time is the median over rounds in which all candidates take turns;
@@ -13,12 +13,8 @@ import json
 import os
 import platform
 import statistics
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 

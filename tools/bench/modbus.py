@@ -47,7 +47,7 @@ def exchange_of_adapter(port: int) -> Callable[[], object]:
 def exchange_of_library(port: int) -> Callable[[], object]:
     """The library alone: registers out, registers in."""
     client = ModbusTcpClient("127.0.0.1", port=port, timeout=1.0, retries=0)
-    client.connect()
+    client.connect()  # type: ignore[no-untyped-call]
     address, count = LAYOUT.input_block
     values = [200, 65436, 100]
 

@@ -1,6 +1,6 @@
 """The campaign behind the figures of reach: many targets, every limit watched at every step.
 
-    .venv/bin/python tools/bench/ik.py --reach --json
+    .venv/bin/python -m tools.bench.ik --reach --json
 
 Steps of 10 ms instead of 1 ms: the same laws and the same checks, in a tenth of the time. The whole
 campaign is drawn from one seed.
@@ -12,12 +12,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
-from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array, Sphere
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths, tip_transform
-from pneuarm.controllers.laws.controller import Controller, Reach
 from pneuarm.controllers.laws.settings import ControlSettings
-from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.limits.keep_out import KeepOutLimit
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import PositionTarget
 from pneuarm.controllers.workspace.workspace import Workspace
 from tools.rig.arms import paper_arm, random_lengths, trunk_arm
@@ -37,7 +38,7 @@ class Watch:
     _BLOCK = 5000
 
     def __init__(self, arm: Arm) -> None:
-        self._arm, self._limits, self._map = arm, Limits(arm), PressureMap(arm)
+        self._arm, self._keep_out, self._map = arm, KeepOutLimit(arm), PressureMap(arm)
         self._violations = self.steps = 0
         self._touched: set[str] = set()
         self._rows: list[tuple[Array, Array, Array]] = []
@@ -94,7 +95,7 @@ class Watch:
         )
 
         def least(values: Array) -> Array:
-            return values.reshape(len(lengths), -1).min(axis=1)
+            return np.asarray(values.reshape(len(lengths), -1).min(axis=1))
 
         left = {
             "length": least(
@@ -117,8 +118,8 @@ class Watch:
             "acceleration": least(1.0 - change / arm.per_chamber("length_acceleration_max_m_s2"))
             + 1e-7,
         }
-        if self._limits.curved[1:]:
-            keep_out = self._limits.keep_out
+        if arm.keep_outs:
+            keep_out = self._keep_out
             left["keep_out"] = np.array([keep_out.left_m(row).min() for row in lengths]) + 1e-13
         return left
 
@@ -149,9 +150,9 @@ def reachable(arm: Arm, number: int, seed: int, around_straight: bool = False) -
         if not around_straight:
             return random_lengths(arm, rng)
         size = 10.0 ** rng.uniform(-12, -2) * (rng.random() < 0.8)
-        low, high = Limits(arm).length.lower_m, Limits(arm).length.upper_m
+        low, high = length_bounds_m(arm)
         mean = rng.uniform(low.max() + 0.011, high.min() - 0.011)
-        return mean + size * rng.uniform(-1.0, 1.0, (arm.n_sections, 3))
+        return np.asarray(mean + size * rng.uniform(-1.0, 1.0, (arm.n_sections, 3)))
 
     for count in range(number):
         place(controller, arm, lengths(), watch)
@@ -209,8 +210,7 @@ class GlobalSearch:
 
     def __init__(self, arm: Arm) -> None:
         self._arm = arm
-        limits = Limits(arm)
-        low, high = limits.length.lower_m[0], limits.length.upper_m[0]
+        low, high = (bound[0] for bound in length_bounds_m(arm))
         self._bounds = list(zip(low, high, strict=True))
         axes = [np.linspace(a, b, 25) for a, b in self._bounds]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 1, 3)
@@ -253,12 +253,13 @@ def acceptance(arm: Arm, ticks: int, seed: int) -> dict[str, object]:
     """Share of usable results of OSQP along wild motions, with every limit there is touched."""
     reach = arm.total_rest_length_m
     ball = Sphere((0.6 * reach, 0.0, 0.8 * reach), 0.15 * reach)
-    tight = {"pressure_slew_max_pa_s": 1.2e5, "pressure_max_pa": 0.5e5, "bend_max_rad": 1.2}
-    section = replace(arm.sections[0], **tight)
+    section = replace(
+        arm.sections[0], pressure_slew_max_pa_s=1.2e5, pressure_max_pa=0.5e5, bend_max_rad=1.2
+    )
     arm = replace(arm, keep_outs=(ball,), body_radius_m=0.02, sections=(section, *arm.sections[1:]))
     rng, controller, watch = np.random.default_rng(seed), Controller(arm, SETTINGS), Watch(arm)
     place(controller, arm, arm.rest_lengths_m, watch)
-    solver = controller._motion.qp_ik._solver
+    solver = controller._chambers.qp_ik._solver
     for tick in range(ticks):
         if tick % 60 == 0:
             far = 1.2 * arm.max_length_m * rng.uniform(-1.0, 1.0, 3)

@@ -21,12 +21,13 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 
-BENCHMARKS = {
-    "kinematics": ["tools/bench/kinematics.py", "--json"],
-    "ik": ["tools/bench/ik.py", "--reach", "--json"],
-    "calibrated": ["tools/bench/calibrated.py", "--json"],
-    "tracking": ["tools/bench/tracking.py", "--json"],
-    "modbus": ["-m", "tools.bench.modbus", "--json"],
+#: Modules of tools.bench, and what else each is told.
+BENCHMARKS: dict[str, tuple[str, ...]] = {
+    "kinematics": (),
+    "ik": ("--reach",),
+    "calibrated": (),
+    "tracking": (),
+    "modbus": (),
 }
 
 Results = dict[str, Any]
@@ -45,9 +46,8 @@ def run(name: str, folder: Path) -> None:
     """Run one benchmark alone; its progress goes to the terminal, its JSON to the folder."""
     begun_s = time.monotonic()
     print(f"{name} ...", file=sys.stderr, flush=True)
-    done = subprocess.run(
-        [sys.executable, *BENCHMARKS[name]], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True
-    )
+    command = [sys.executable, "-m", f"tools.bench.{name}", *BENCHMARKS[name], "--json"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").write_text(done.stdout)
     print(f"{name}: {time.monotonic() - begun_s:.0f} s", file=sys.stderr, flush=True)

@@ -5,9 +5,8 @@ from collections import deque
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.targets.shapes import Shape
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation
 from pneuarm.controllers.targets.targets import CircleTarget, PositionTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype
@@ -23,10 +22,8 @@ _START_NS = 5_000_000_000
 _TIMEOUTS = Timeouts(target_s=0.2, arming_s=30.0, hold_s=60.0, full_disk_vent_s=0.5)
 
 
-class Seen:
+class FilmedArm:
     """A simulated arm, whose newest true tip the camera looks at."""
-
-    has_watchdog = True
 
     def __init__(self, device: Hardware) -> None:
         self.device = device
@@ -50,7 +47,7 @@ class Seen:
         self.device.close()
 
 
-class Rig:
+class CameraRig:
     """Daemon's loop, arm and camera; one tick is one period of the configuration.
 
     The camera takes ``camera_hz`` poses a second, which arrive ``delay_s`` later, with
@@ -69,7 +66,7 @@ class Rig:
         self.arm = configuration.build_arm()
         rate_hz = configuration.control.rate_hz
         self.period_ns = round(1e9 / rate_hz)
-        self.hardware = Seen(backends.build(configuration, self.arm))
+        self.hardware = FilmedArm(backends.build(configuration, self.arm))
         self.events: list[pb.Event] = []
         settings = LoopSettings.of(configuration, _TIMEOUTS, _START_NS, _START_NS)
         self.hardware.connect()
@@ -113,10 +110,10 @@ class Rig:
             self._sequence += 1
             given.append(SetTarget(self._target, self._sequence, self.now_ns))
         record, _ = self.loop.tick(self.now_ns, given, Disk.OK, Timing())
-        self._records.append(bytes(record))
+        self._records.append(record)
         self._look()
 
-    def activate(self) -> "Rig":
+    def activate(self) -> "CameraRig":
         """Wait for ready, and arm."""
         while self.loop.mode != Mode.READY:
             self.tick()
@@ -152,6 +149,6 @@ class Rig:
         """Go to a position."""
         return self.run(seconds, PositionTarget(np.asarray(position_m, dtype=np.float64)))
 
-    def circle(self, shape: Shape, seconds: float) -> np.ndarray:
+    def circle(self, shape: CircleTarget, seconds: float) -> np.ndarray:
         """Go round."""
-        return self.run(seconds, CircleTarget(shape, 1))
+        return self.run(seconds, shape)

@@ -1,6 +1,6 @@
 """How well the tip follows: the real loop on simulated time, a simulated camera, gravity on.
 
-    .venv/bin/python tools/bench/tracking.py --json
+    .venv/bin/python -m tools.bench.tracking --json
 
 Every figure is of the true tip. The camera takes 100 poses a second, which arrive 10 ms late with
 0.1 mm of noise on every axis. Each seed is another arm of the family; the calibrated one has what
@@ -11,19 +11,16 @@ with which the constants of reference and correction were chosen.
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.targets.shapes import Circle
+from pneuarm.controllers.targets.targets import CircleTarget
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 from tools.bench.calibrated import targets_of
-from tools.bench.rig import Rig
+from tools.bench.rig import CameraRig
 from tools.rig.simulated import configuration_of
 
 Row = dict[str, Any]
@@ -31,7 +28,7 @@ Row = dict[str, Any]
 RATE_HZ = 1000.0
 
 HOME = np.array([0.0, 0.0, 0.2])
-CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25)
+CIRCLE = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25)
 
 #: A target is given this time (s), and its error is that of the last part of it.
 TARGET_S, STEADY_S = 4.0, 0.5
@@ -46,7 +43,7 @@ def _error(ticks: np.ndarray, position: Array) -> Array:
     return error
 
 
-def steady_errors_m(rig: Rig, targets: Array) -> list[float]:
+def steady_errors_m(rig: CameraRig, targets: Array) -> list[float]:
     """Mean distance of the tip from every target in the last half second."""
     last = round(STEADY_S * 1e9 / rig.period_ns)
     found = []
@@ -56,7 +53,7 @@ def steady_errors_m(rig: Rig, targets: Array) -> list[float]:
     return found
 
 
-def step(rig: Rig, start: Array, end: Array) -> tuple[float, float]:
+def step(rig: CameraRig, start: Array, end: Array) -> tuple[float, float]:
     """Time until the tip stays within 1 mm, from the target's arrival, and the overshoot."""
     rig.to(start, STEP_S)
     ticks = rig.to(end, STEP_S)
@@ -68,7 +65,7 @@ def step(rig: Rig, start: Array, end: Array) -> tuple[float, float]:
     return settled_s, max(0.0, float(beyond))
 
 
-def steps(rig: Rig, seed: int) -> list[tuple[float, float]]:
+def steps(rig: CameraRig, seed: int) -> list[tuple[float, float]]:
     """Steps of 50 mm through the middle of the workspace, in random directions."""
     rng = np.random.default_rng([seed, 3])
     found = []
@@ -78,7 +75,7 @@ def steps(rig: Rig, seed: int) -> list[tuple[float, float]]:
     return found
 
 
-def circle_rms_m(rig: Rig) -> float:
+def circle_rms_m(rig: CameraRig) -> float:
     """Root of the mean squared distance from the circle's point of the time, after a turn."""
     rig.circle(CIRCLE, WARM_S)
     ticks = rig.circle(CIRCLE, CIRCLE_S - WARM_S)
@@ -93,7 +90,7 @@ def _jumps(ticks: np.ndarray) -> dict[str, float]:
     return {"tip_mm": 1e3 * float(tip.max()), "pressure_mbar": 0.01 * float(pressure.max())}
 
 
-def camera_lost(rig: Rig) -> dict[str, dict[str, float]]:
+def camera_lost(rig: CameraRig) -> dict[str, dict[str, float]]:
     """Largest jumps of the commands on the circle: undisturbed, camera lost, camera back."""
     rig.circle(CIRCLE, WARM_S)
     undisturbed = _jumps(rig.circle(CIRCLE, 4.0))
@@ -107,7 +104,7 @@ def camera_lost(rig: Rig) -> dict[str, dict[str, float]]:
 def measure(configuration: Configuration, camera: bool, targets: int) -> Row:
     """All figures of one arm."""
     seed = configuration.simulator.seed
-    rig = Rig(configuration, camera=camera).activate()
+    rig = CameraRig(configuration, camera=camera).activate()
     rig.to(HOME, STEP_S)
     row: Row = {
         "seed": seed,

@@ -15,7 +15,8 @@ from pneuarm.controllers.arm.arm import Arm
 from pneuarm.service.configuration.configuration import load
 from tools.faults.clock import settable_clock
 from tools.faults.device_audit import audit_device
-from tools.faults.fault import Fault, Injection, Row
+from tools.faults.fault import Fault, Row
+from tools.faults.injection import Injection
 from tools.faults.log_audit import audit_log
 from tools.faults.rig import Rig
 

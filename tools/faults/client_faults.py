@@ -4,7 +4,8 @@ import signal
 import time
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
-from tools.faults.fault import Fault, Injection
+from tools.faults.fault import Fault
+from tools.faults.injection import Injection
 from tools.faults.rig import TABLES, Rig
 from tools.rig.daemon import enough
 

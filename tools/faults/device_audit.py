@@ -7,7 +7,7 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm
 from tools.faults.emulator import EMPTY_PA, Record, read_record
-from tools.faults.fault import Injection
+from tools.faults.injection import Injection
 
 #: A terminal takes whole millibars, and the guard believes it to have taken the fraction too.
 _QUANTUM_PA = 300.0

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
-from tools.faults.fault import Fault, Injection
+from tools.faults.fault import Fault
+from tools.faults.injection import Injection
 from tools.faults.rig import Rig
 from tools.rig.daemon import enough
 

@@ -114,7 +114,8 @@ class Record:
 
 def read_record(path: Path) -> Record:
     """Read a device's record; the line that is being written is left out."""
-    setpoints, samples = [], []
+    setpoints: list[dict[str, Any]] = []
+    samples: list[dict[str, Any]] = []
     for line in path.read_text().splitlines():
         try:
             entry = json.loads(line)

@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf import json_format
 from google.protobuf.message import Message
 
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import JSON, PROTOBUF, decode
 from pneuarm.logs.schema.topics import full_key
@@ -89,7 +89,8 @@ class Garbage:
         """Return any value JSON can hold, under names that mean something here."""
         rng = self._random
         names = ("position", "position_m", "x", "action", "lengths", "length_m", "law", "frame_id")
-        leaves = (None, True, 1e308, -1, 2**70, "NaN", "base", "\ud800", "ENABLE", [], {})
+        leaves: list[object] = [None, True, 1e308, -1, 2**70, "NaN", "base", "\ud800", "ENABLE"]
+        leaves += [[], {}]
         if depth == 0 or rng.random() < 0.3:
             return rng.choice(leaves)
         if rng.random() < 0.3:
@@ -97,11 +98,15 @@ class Garbage:
         return {rng.choice(names): self._wild(depth - 1) for _ in range(rng.randrange(4))}
 
 
+def _ignore(reply: zenoh.Reply) -> None:
+    """Leave an answer unread."""
+
+
 def is_request(payload: bytes, encoding: str) -> bool:
     """Say whether a payload is a request that anybody may make."""
     try:
         request = decode(pb.ModeRequest, payload, encoding)
-    except TargetRejected:
+    except MessageRejected:
         return False
     anybodys = request.action in (pb.HOLD_NOW, pb.VENT, pb.RESET)
     return anybodys or request.take_over
@@ -112,7 +117,7 @@ class Fuzzer:
 
     def __init__(self, arm: str, endpoint: str) -> None:
         self._session = network.open_connected(endpoint)
-        self._key = lambda key: full_key(arm, key)
+        self._arm = arm
         self._room = threading.Semaphore(64)  # queries under way
 
     def send(self, seed: int, number: int) -> int:
@@ -136,7 +141,7 @@ class Fuzzer:
 
     def _put(self, key: str, payload: bytes, encoding: str) -> None:
         self._session.put(
-            self._key(key),
+            full_key(self._arm, key),
             payload,
             encoding=encoding,
             congestion_control=zenoh.CongestionControl.BLOCK,
@@ -145,8 +150,8 @@ class Fuzzer:
     def _ask(self, key: str, payload: bytes, encoding: str) -> None:
         self._room.acquire(timeout=3.0)
         self._session.get(
-            self._key(key),
-            zenoh.handlers.Callback(lambda reply: None, self._room.release),
+            full_key(self._arm, key),
+            zenoh.handlers.Callback(_ignore, self._room.release),
             payload=payload,
             encoding=encoding,
             timeout=3.0,

@@ -10,7 +10,7 @@ from pneuarm.controllers.arm.errors import PneuarmError
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import EVENT, STATE, TARGET
-from tools.faults.fault import Injection
+from tools.faults.injection import Injection
 
 #: Of a monotonic time in seconds, times the slew.
 _ROUNDING_PA = 1e-3

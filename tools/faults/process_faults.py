@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.modes.mode_keeper import GATEWAY_LOST_S, GATEWAY_SILENT_S
 from tools.faults.device_faults import ZERO_S
-from tools.faults.fault import Fault, Injection
+from tools.faults.fault import Fault
+from tools.faults.injection import Injection
 from tools.faults.rig import Rig
 from tools.rig.daemon import enough
 

@@ -47,7 +47,7 @@ class Program:
                     return line.removeprefix(begins).strip()
             if self.process.poll() is not None and self._lines.empty():
                 break
-        raise TimeoutError(f"{self.process.args[2]} did not say {begins!r}")  # type: ignore[index]
+        raise TimeoutError(f"{self.process.args!r} did not say {begins!r}")
 
     def ask(self, words: str, begins: str) -> str:
         """Write a line and wait for its answer."""

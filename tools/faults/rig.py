@@ -15,7 +15,7 @@ from pneuarm.controllers.arm.errors import PneuarmError
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import load
 from tools.faults.emulator import EMPTY_PA, Emulator
-from tools.faults.fault import Injection
+from tools.faults.injection import Injection
 from tools.faults.program import Program
 from tools.rig.daemon import Daemon, health_of, wait_for
 
@@ -48,6 +48,7 @@ class Rig:
         self._watcher: Client | None = None
         self._mover: Program | None = None
         self._beside: dict[str, Program] = {}
+        self._air_pa = 0.0
 
     def __enter__(self) -> "Rig":
         """Start everything."""
@@ -179,10 +180,12 @@ class Rig:
 
     def wait_for_mode(self, *modes: int, patience_s: float = 10.0) -> int:
         """Wait until the arm is in one of these modes, though the gateway may be away for long."""
-        names = " or ".join(pb.Mode.Name(mode) for mode in modes)  # type: ignore[arg-type]
+        names = " or ".join(pb.Mode.Name(mode) for mode in modes)
         return self.wait_until(lambda: self.mode in modes and self.mode, names, patience_s)
 
-    def wait_until(self, condition: Callable[[], T], what: str, patience_s: float = 10.0) -> T:
+    def wait_until(
+        self, condition: Callable[[], T | None], what: str, patience_s: float = 10.0
+    ) -> T:
         """Wait for something that may be unreachable in between."""
 
         def tried() -> T | None:
@@ -208,7 +211,8 @@ class Rig:
             state = self.watcher.state()
             if state.mode != pb.ACTIVE:
                 self.mover.ask("go", "moves")
-            return max((abs(p) for p in state.pressure_sent_pa), default=0.0) > self._air_pa
+            largest_pa = max((abs(p) for p in state.pressure_sent_pa), default=0.0)
+            return largest_pa > self._air_pa
 
         self.wait_until(has_air, "air in a moving arm", 20.0)
 

@@ -2,7 +2,8 @@
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import full_key
-from tools.faults.fault import Fault, Injection
+from tools.faults.fault import Fault
+from tools.faults.injection import Injection
 from tools.faults.rig import Rig
 
 #: In one injection; thirty of them are more than the hundred thousand.

@@ -6,7 +6,7 @@ import numpy as np
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array, Section
-from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
 
 PAPER_SECTION = Section(
     rest_length_m=0.2,
@@ -75,13 +75,11 @@ ARMS = {"paper": paper_arm(), "table1": table1_arm(), "trunk": trunk_arm()}
 
 def random_lengths(arm: Arm, rng: np.random.Generator, share: float = 1.0) -> Array:
     """Lengths (n_sections, 3) within all limits, over ``share`` of the way to each of them."""
-    limits = Limits(arm)
+    offset, most = arm.per_section("chamber_offset_m"), arm.per_section("bend_max_rad")[:, 0]
     low, high = length_bounds_m(arm)
     middle, half = 0.5 * (low + high), 0.5 * share * (high - low)
     while True:
         lengths = rng.uniform(middle - half, middle + half)
-        theta = limits.bend.bend_max_rad - limits.bend.slack_m(lengths) / arm.per_section(
-            "chamber_offset_m"
-        ).reshape(-1)
-        if (theta <= share * limits.bend.bend_max_rad).all():
+        shapes = shapes_from_lengths(lengths, offset)
+        if (np.hypot(shapes[:, 1], shapes[:, 2]) <= share * most).all():
             return lengths

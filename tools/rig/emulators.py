@@ -35,8 +35,8 @@ class Emulator:
         # A test machine may be busier than any robot's.
         self.tables["hardware"] |= {"exchange_rate_hz": 100.0}
         self.tables["control"] = {"rate_hz": 250.0}
-        serial = name in ("ctrl-p", "esp32")
-        patient = {"timeout_ms": 3000.0} if serial else {"timeout_ms": 150.0, "watchdog_ms": 500}
+        festo = name.startswith("festo")
+        patient = {"timeout_ms": 150.0, "watchdog_ms": 500} if festo else {"timeout_ms": 3000.0}
         self.tables[name.replace("-", "_")] |= patient
 
     def say(self, words: str) -> None:

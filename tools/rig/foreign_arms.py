@@ -75,8 +75,11 @@ class _Rods(_Shooting):
 
 def _unloaded(arm: Arm) -> Arm:
     """The same chambers on a body without weight."""
-    none = {"bending_compliance_rad_per_n_m": 0.0, "axial_compliance_m_per_n": 0.0}
-    return replace(arm, sections=tuple(replace(section, **none) for section in arm.sections))
+    sections = tuple(
+        replace(section, bending_compliance_rad_per_n_m=0.0, axial_compliance_m_per_n=0.0)
+        for section in arm.sections
+    )
+    return replace(arm, sections=sections)
 
 
 def rod_of(arm: Arm, bend_lost: float) -> RodProperties:
@@ -113,5 +116,5 @@ def recording_of(
     tips = foreign.tips(places)[back.reshape(-1)]
     noise = rng.normal(0.0, _NOISE_M, (len(tips), 3))
     measured = sent_pa + rng.normal(0.0, 100.0, sent_pa.shape)
-    time_s = sample_s * np.arange(len(sent_pa))
+    time_s: Array = sample_s * np.arange(len(sent_pa), dtype=np.float64)
     return Recording(time_s, sent_pa, measured, tips[:, :3, 3] + noise, tips[:, :3, :3])

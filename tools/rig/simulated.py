@@ -42,7 +42,6 @@ class Watched:
     fail_read: Exception | None = None
     fail_write: Exception | None = None
     fail_vent: Exception | None = None
-    has_watchdog: bool = True
 
     def connect(self) -> None:
         self.device.connect()
@@ -123,7 +122,8 @@ class Bench:
     @property
     def newest(self) -> np.void:
         dtype = tick_dtype(self.arm.n_sections)
-        return np.frombuffer(self.records[-1], dtype)[0]
+        tick: np.void = np.frombuffer(self.records[-1], dtype)[0]
+        return tick
 
     def ticks(self) -> np.ndarray:
         return np.frombuffer(b"".join(self.records), tick_dtype(self.arm.n_sections))
@@ -137,7 +137,7 @@ class Bench:
         self._overruns += self.overruns_per_tick
         timing = Timing(compute_s=1e-4, overruns=int(self._overruns))
         record, replies = self.loop.tick(self.now_ns, [*given, *commands], self.disk, timing)
-        self.records.append(bytes(record))
+        self.records.append(record)
         self.replies += replies
         return self.newest
 

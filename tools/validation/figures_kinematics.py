@@ -1,6 +1,6 @@
 """The figures of the kinematics: how well its forms agree, over many random configurations.
 
-    .venv/bin/python tools/validation/figures_kinematics.py [--samples N]
+    .venv/bin/python -m tools.validation.figures_kinematics [--samples N]
 
 Prints one JSON object. Lengths are metres, angles radians; ``worst`` is over all samples.
 """
@@ -12,8 +12,6 @@ import sys
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
@@ -35,10 +33,11 @@ from pneuarm.controllers.kinematics.serial_chain import (
     velocity_jacobian,
 )
 from pneuarm.controllers.kinematics.smooth import smooth
-from pneuarm.service.validation.text import markdown_table
 from tools.rig.arms import paper_arm, random_lengths, trunk_arm
 from tools.validation import precise
+from tools.validation.markdown import markdown_table
 
+ROOT = Path(__file__).parents[2]
 OFFSET_M = 0.038
 ASYMMETRIES_M = (0.0, 1e-15, 1e-12, 1e-9, 1e-6)
 CHUNK = 50_000
@@ -274,10 +273,8 @@ trials, otherwise it says by its residual how far off it is
 
 def speed() -> str:
     """Return the benchmark's figures as Markdown; the benchmark binds itself to one core."""
-    program = Path(__file__).parents[1] / "bench" / "kinematics.py"
-    done = subprocess.run(
-        [sys.executable, str(program), "--json"], capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, "-m", "tools.bench.kinematics", "--json"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     found = json.loads(done.stdout)
     if found["soromox_fk_jacobian_us"] is None:
         return "Speed beside soromox: not measured, `make bench-setup` installs it."

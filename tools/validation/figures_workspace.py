@@ -1,14 +1,14 @@
 """The workspace's part of docs/validation.md: volume, extents and pictures of the built-in arms."""
 
+from functools import cache
 from pathlib import Path
 
 from pneuarm.controllers.workspace.summary import Summary, summarise
 from pneuarm.service.configuration.configuration import load
-from pneuarm.service.validation.text import markdown_table
 from pneuarm.service.workspace.command import as_dict
 from pneuarm.service.workspace.picture import write_png
+from tools.validation.markdown import markdown_table
 
-_PICTURES = Path(__file__).parents[2] / "docs" / "images"
 _SAMPLES = 20_000
 _ARMS = ("paper", "table1", "trunk")
 
@@ -24,15 +24,22 @@ def _row(summary: Summary) -> list[str]:
     ]
 
 
+@cache
+def _summaries() -> list[Summary]:
+    return [summarise(load(preset=name).build_arm(), _SAMPLES) for name in _ARMS]
+
+
+def draw(directory: Path) -> None:
+    """Draw the picture of each arm into a directory."""
+    for summary in _summaries():
+        write_png(directory / f"workspace-{summary.arm.name}.png", summary)
+
+
 def section() -> str:
-    """Return the text, and draw the picture of each arm beside the document."""
-    summaries = [summarise(load(preset=name).build_arm(), _SAMPLES) for name in _ARMS]
-    _PICTURES.mkdir(parents=True, exist_ok=True)
-    for summary in summaries:
-        write_png(_PICTURES / f"workspace-{summary.arm.name}.png", summary)
+    """Return the text; its pictures lie in ``images/``."""
     table = markdown_table(
         ["arm", "how", "volume, litres", "x, mm", "y, mm", "z, mm"],
-        [_row(summary) for summary in summaries],
+        [_row(summary) for summary in _summaries()],
     )
     return f"""## Workspace (the paper's section 4, Fig. 3)
 

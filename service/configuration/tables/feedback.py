@@ -6,7 +6,7 @@ from pydantic import Field
 
 from pneuarm.controllers.feedback.observer import FeedbackSettings
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.service.configuration.tables.table import MM, Positive, Table
+from pneuarm.hardware.tables.table import MM, Positive, Table
 
 _MBAR = 100.0
 
@@ -14,9 +14,21 @@ _MBAR = 100.0
 class ReferenceConfig(Table):
     """How fast the reference goes to a target."""
 
-    speed_max_mm_s: Annotated[float, Field(gt=0, le=5000)] = 500.0
-    acceleration_max_mm_s2: Annotated[float, Field(gt=0, le=100000)] = 2000.0
-    jerk_max_mm_s3: Annotated[float, Field(gt=0, le=10000000)] = 20000.0
+    speed_max_mm_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=5000,
+            description="largest speed of the reference; an axis gets it over the root of three",
+        ),
+    ] = 500.0
+    acceleration_max_mm_s2: Annotated[
+        float, Field(gt=0, le=100000, description="largest acceleration, likewise")
+    ] = 2000.0
+    jerk_max_mm_s3: Annotated[
+        float,
+        Field(gt=0, le=10000000, description="largest jerk, likewise; lower swings the arm less"),
+    ] = 20000.0
 
     def limits(self) -> ReferenceLimits:
         """Return the limits in SI units."""
@@ -28,20 +40,95 @@ class ReferenceConfig(Table):
 class FeedbackConfig(Table):
     """The correction by the measured tip, and when a measurement is believed."""
 
-    enabled: bool = True
-    camera_delay_ms: Annotated[float, Field(ge=0, le=300)] = 10.0
-    camera_timeout_ms: Annotated[float, Field(ge=20, le=5000)] = 100.0
-    time_constant_ms: Annotated[float, Field(ge=20, le=10000)] = 170.0
-    rate_max_mm_s: Positive = 50.0
-    deadband_mm: Annotated[float, Field(ge=0, le=5)] = 0.1
-    jump_max_mm: Positive = 20.0
-    jump_accept_s: Annotated[float, Field(gt=0, le=60)] = 0.5
-    model_sigma_mm: Positive = 25.0
-    length_sigma_mm: Positive = 10.0
-    dither_mbar: Annotated[float, Field(ge=0, le=100)] = 15.0
-    dither_period_ms: Annotated[float, Field(ge=4, le=1000)] = 30.0
-    hysteresis_share: Annotated[float, Field(ge=0, le=1)] = 0.55
-    hysteresis_share_moving: Annotated[float, Field(ge=0, le=1)] = 0.65
+    enabled: Annotated[
+        bool,
+        Field(
+            description="whether `sensor/tip_pose` corrects the arm; it is estimated with it anyway"
+        ),
+    ] = True
+    camera_delay_ms: Annotated[
+        float, Field(ge=0, le=300, description="age of a tip pose when it arrives")
+    ] = 10.0
+    camera_timeout_ms: Annotated[
+        float,
+        Field(ge=20, le=5000, description="without a pose for this long the camera counts as lost"),
+    ] = 100.0
+    time_constant_ms: Annotated[
+        float,
+        Field(
+            ge=20,
+            le=10000,
+            description=(
+                "how fast the correction follows the measured difference; twice as fast while the "
+                "tip stands still"
+            ),
+        ),
+    ] = 170.0
+    rate_max_mm_s: Annotated[Positive, Field(description="how fast the correction may change")] = (
+        50.0
+    )
+    deadband_mm: Annotated[
+        float, Field(ge=0, le=5, description="a smaller difference changes nothing")
+    ] = 0.1
+    jump_max_mm: Annotated[
+        Positive, Field(description="a pose that is further off the ones before is refused")
+    ] = 20.0
+    jump_accept_s: Annotated[
+        float,
+        Field(gt=0, le=60, description="poses that stay there, and agree, for this long are taken"),
+    ] = 0.5
+    model_sigma_mm: Annotated[
+        Positive,
+        Field(description="standard deviation of the tip where nothing but pressures is measured"),
+    ] = 25.0
+    length_sigma_mm: Annotated[
+        Positive, Field(description="the same where every chamber has a length sensor")
+    ] = 10.0
+    dither_mbar: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=100,
+            description=(
+                "swing of the setpoints against stiction and resolution of the valves, while a "
+                "measured tip is followed; 0 is none"
+            ),
+        ),
+    ] = 15.0
+    dither_period_ms: Annotated[
+        float,
+        Field(
+            ge=4,
+            le=1000,
+            description=(
+                "its period; four times the swing in a period must stay well below "
+                "`pressure_slew_max_bar_s`"
+            ),
+        ),
+    ] = 30.0
+    hysteresis_share: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=1,
+            description=(
+                "share of the calibrated hysteresis that is inverted while a measured tip is "
+                "followed and the reference stands; a calibrated loop holds that of the valves too,"
+                " which the dither takes away"
+            ),
+        ),
+    ] = 0.55
+    hysteresis_share_moving: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=1,
+            description=(
+                "the same while the reference moves at 60 mm/s or faster; in between it grows with "
+                "the speed"
+            ),
+        ),
+    ] = 0.65
 
     def settings(self) -> FeedbackSettings:
         """Return them in SI units."""

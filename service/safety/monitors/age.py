@@ -1,7 +1,7 @@
 """A measurement that is too old."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Seen
+from pneuarm.service.safety.monitors.monitor import Observation
 
 
 class Age:
@@ -14,7 +14,7 @@ class Age:
         self.code = code
         self._oldest_s = oldest_s
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Tell the age and what is allowed."""
         if seen.age_s <= self._oldest_s:
             return ""

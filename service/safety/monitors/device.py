@@ -1,7 +1,7 @@
 """What the device says by itself: complaints, and its stop input."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Seen
+from pneuarm.service.safety.monitors.monitor import Observation
 
 
 class Complaints:
@@ -9,7 +9,7 @@ class Complaints:
 
     code = FaultCode.DEVICE_COMPLAINS
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Return the complaints."""
         return "; ".join(seen.complaints)
 
@@ -19,6 +19,6 @@ class StopInput:
 
     code = FaultCode.STOP_PRESSED
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Tell that it is pressed."""
         return "the stop input of the device is pressed" if seen.stop_pressed else ""

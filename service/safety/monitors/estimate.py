@@ -2,7 +2,7 @@
 
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, chamber
 
 
 class Estimate:
@@ -14,9 +14,9 @@ class Estimate:
         self._low_m = (arm.per_chamber("length_min_m").reshape(-1) - margin_m).tolist()
         self._high_m = (arm.per_chamber("length_max_m").reshape(-1) + margin_m).tolist()
         self._lasting_s = lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber and its estimated length."""
         bad = -1
         bounds = zip(seen.estimated_m, self._low_m, self._high_m, strict=True)

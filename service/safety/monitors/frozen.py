@@ -1,7 +1,7 @@
 """A sensor that repeats itself bit by bit while its command moves."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar, chamber
 
 
 class Frozen:
@@ -15,11 +15,11 @@ class Frozen:
 
     def __init__(self, moved_pa: float, lasting_s: float) -> None:
         self._moved_pa, self._lasting_s = moved_pa, lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
         self._reading_pa: list[float] = []
         self._expected_pa: list[float] = []
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber and the reading at which it stands."""
         if not self._reading_pa:
             self._reading_pa, self._expected_pa = list(seen.measured_pa), list(seen.expected_pa)

@@ -4,7 +4,7 @@ from math import exp
 
 from pneuarm.service.modes.mode import Mode
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar, chamber
 
 #: After the hold begins the valves need this long to close; what is then measured is the start.
 SETTLED_S = 0.8
@@ -22,12 +22,12 @@ class Leak:
 
     def __init__(self, drop_pa: float, lasting_s: float) -> None:
         self._drop_pa, self._lasting_s = drop_pa, lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
         self._held_s = 0.0
         self._filtered_pa: list[float] = []
         self._start_pa: list[float] = []
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber and what it has lost."""
         if seen.mode != Mode.HOLD:
             self._held_s = 0.0
@@ -40,7 +40,7 @@ class Leak:
         start, now = self._start_pa[index], self._filtered_pa[index]
         return f"{chamber(index)} was held at {bar(start)} and has {bar(now)}"
 
-    def _filter(self, seen: Seen) -> None:
+    def _filter(self, seen: Observation) -> None:
         if self._held_s == 0.0:
             self._filtered_pa = list(seen.measured_pa)
         self._held_s += seen.dt_s

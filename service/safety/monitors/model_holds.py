@@ -5,7 +5,7 @@ import numpy as np
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, chamber
 
 
 class ModelHolds:
@@ -22,9 +22,9 @@ class ModelHolds:
         self._length_tolerance_m, self._tip_tolerance_m = length_tolerance_m, tip_tolerance_m
         self._lasting_s = lasting_s
         self._pressure_map = PressureMap(arm)
-        self._lasting = Lasting()
+        self._lasting = Persistence()
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Tell which measurement is how far off."""
         what = ""
         if seen.tip_error_m > self._tip_tolerance_m:  # false of NaN: nothing measures the tip
@@ -34,7 +34,7 @@ class ModelHolds:
             what = self._length_that_is_off(seen)
         return what if self._lasting.longer(bool(what), seen.now_s, self._lasting_s) else ""
 
-    def _length_that_is_off(self, seen: Seen) -> str:
+    def _length_that_is_off(self, seen: Observation) -> str:
         pressures_pa = np.reshape(seen.measured_pa, (-1, 3))
         models_m = self._pressure_map.lengths_m(pressures_pa).ravel().tolist()
         for index, (length_m, model_m) in enumerate(zip(seen.lengths_m, models_m, strict=True)):

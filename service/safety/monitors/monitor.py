@@ -8,7 +8,7 @@ from pneuarm.service.safety.faults import FaultCode
 
 
 @dataclass(slots=True)  # made in every tick: freezing it would cost more than all of its use
-class Seen:
+class Observation:
     """One tick as the monitors see it: SI units, chambers in lists row by row, NaN is unknown.
 
     ``sent_pa`` is what the valves were told in the tick before, ``expected_pa`` what should have
@@ -38,12 +38,12 @@ class Monitor(Protocol):
 
     code: FaultCode
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Return what is wrong in words, or an empty string. Called once a tick."""
         ...
 
 
-class Lasting:
+class Persistence:
     """Whether something has been so without a break for longer than a time."""
 
     def __init__(self) -> None:

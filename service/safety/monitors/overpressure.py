@@ -2,7 +2,7 @@
 
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar, chamber
 
 
 class Overpressure:
@@ -14,9 +14,9 @@ class Overpressure:
         highest = arm.per_chamber("pressure_max_pa").reshape(-1)
         self._allowed_pa = (highest + margin_pa).tolist()
         self._lasting_s = lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber and its pressure."""
         over = -1
         pairs = zip(seen.measured_pa, self._allowed_pa, strict=True)

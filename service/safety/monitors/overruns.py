@@ -1,7 +1,7 @@
 """A loop that misses its deadlines."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Seen
+from pneuarm.service.safety.monitors.monitor import Observation
 
 WINDOW_S = 1.0
 
@@ -17,7 +17,7 @@ class Overruns:
         self._begin_overruns = self._ticks = 0
         self._what = ""
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Tell how many deadlines were missed; it stays said for the second that follows."""
         if self._begin_s is None:
             self._begin_s, self._begin_overruns = seen.now_s, seen.overruns

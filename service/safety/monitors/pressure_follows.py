@@ -1,7 +1,7 @@
 """A pressure that does not follow its command: a stuck valve, a kinked or burst tube."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar, chamber
 
 #: By how much the true lag may differ from the configured one, as a fraction. In a fast move it
 #: errs by this fraction of what the valve has still to go.
@@ -19,10 +19,10 @@ class PressureFollows:
     def __init__(self, tolerance_pa: float, lasting_s: float, vent_timeout_s: float) -> None:
         self._tolerance_pa = tolerance_pa
         self._lasting_s, self._vent_timeout_s = lasting_s, vent_timeout_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
         self._active = False
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber, what it measures and what was expected."""
         index = self._deviating(seen)
         in_fault = self._active or not seen.vented
@@ -33,7 +33,7 @@ class PressureFollows:
         measured, expected = seen.measured_pa[index], seen.expected_pa[index]
         return f"{chamber(index)} has {bar(measured)}; {bar(expected)} was expected"
 
-    def _deviating(self, seen: Seen) -> int:
+    def _deviating(self, seen: Observation) -> int:
         tolerance_pa = self._tolerance_pa
         triples = zip(seen.measured_pa, seen.expected_pa, seen.sent_pa, strict=True)
         for index, (measured, expected, sent) in enumerate(triples):

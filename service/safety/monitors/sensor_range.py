@@ -2,7 +2,7 @@
 
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar, chamber
 
 
 class SensorRange:
@@ -14,9 +14,9 @@ class SensorRange:
         self._low_pa = float(arm.per_chamber("pressure_min_pa").min()) - margin_pa
         self._high_pa = float(arm.per_chamber("pressure_max_pa").max()) + margin_pa
         self._lasting_s = lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber and what its sensor says."""
         low, high = self._low_pa, self._high_pa
         bad = -1

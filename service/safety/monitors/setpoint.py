@@ -1,7 +1,7 @@
 """A setpoint on the device that is not ours."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar, chamber
 
 
 class Setpoint:
@@ -14,9 +14,9 @@ class Setpoint:
 
     def __init__(self, tolerance_pa: float, lasting_s: float) -> None:
         self._tolerance_pa, self._lasting_s = tolerance_pa, lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Name the chamber, its setpoint and ours; without setpoints there is nothing to see."""
         setpoints_pa = seen.setpoints_pa or []
         foreign = self._foreign(setpoints_pa, seen)
@@ -25,7 +25,7 @@ class Setpoint:
         theirs, ours = setpoints_pa[foreign], seen.sent_pa[foreign]
         return f"{chamber(foreign)} is set to {bar(theirs)} on the device; we sent {bar(ours)}"
 
-    def _foreign(self, setpoints_pa: list[float], seen: Seen) -> int:
+    def _foreign(self, setpoints_pa: list[float], seen: Observation) -> int:
         for index, setpoint in enumerate(setpoints_pa):
             sent, expected = seen.sent_pa[index], seen.expected_pa[index]
             above = setpoint - max(sent, expected)

@@ -1,7 +1,7 @@
 """A supply that cannot fill the arm."""
 
 from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.monitor import Lasting, Seen, bar
+from pneuarm.service.safety.monitors.monitor import Observation, Persistence, bar
 
 
 class Supply:
@@ -11,9 +11,9 @@ class Supply:
 
     def __init__(self, least_pa: float, lasting_s: float) -> None:
         self._least_pa, self._lasting_s = least_pa, lasting_s
-        self._lasting = Lasting()
+        self._lasting = Persistence()
 
-    def look(self, seen: Seen) -> str:
+    def look(self, seen: Observation) -> str:
         """Tell what there is and what is needed; NaN, a device without such a sensor, is well."""
         low = seen.supply_pa < self._least_pa
         if not self._lasting.longer(low, seen.now_s, self._lasting_s):

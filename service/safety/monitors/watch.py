@@ -2,6 +2,7 @@
 
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.hardware.interface import Measurement
+from pneuarm.service.configuration.monitor_settings import MonitorSettings
 from pneuarm.service.modes.mode import VENTED_MODES, Mode
 from pneuarm.service.safety.faults import FaultCode
 from pneuarm.service.safety.monitors.age import Age
@@ -11,13 +12,12 @@ from pneuarm.service.safety.monitors.frozen import Frozen
 from pneuarm.service.safety.monitors.lag import Lag
 from pneuarm.service.safety.monitors.leak import Leak
 from pneuarm.service.safety.monitors.model_holds import ModelHolds
-from pneuarm.service.safety.monitors.monitor import Monitor, Seen
+from pneuarm.service.safety.monitors.monitor import Monitor, Observation
 from pneuarm.service.safety.monitors.overpressure import Overpressure
 from pneuarm.service.safety.monitors.overruns import Overruns
 from pneuarm.service.safety.monitors.pressure_follows import PressureFollows
 from pneuarm.service.safety.monitors.sensor_range import SensorRange
 from pneuarm.service.safety.monitors.setpoint import Setpoint
-from pneuarm.service.safety.monitors.settings import MonitorSettings
 from pneuarm.service.safety.monitors.supply import Supply
 
 
@@ -83,7 +83,7 @@ class Watch:
         # Before its first acknowledgement a device has not been told anything but zero.
         sent = [value if value == value else 0.0 for value in sent_pa.ravel().tolist()]
         setpoints = measurement.setpoints_pa
-        seen = Seen(
+        seen = Observation(
             now_s=now_s,
             dt_s=dt_s,
             mode=mode,

@@ -11,7 +11,7 @@ from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
 from pneuarm.controllers.calibration.excitation import require_motion
 from pneuarm.controllers.calibration.fit import fit
-from pneuarm.controllers.calibration.frames import Frames, aligned, rotation_of
+from pneuarm.controllers.calibration.frames import Frames, aligned
 from pneuarm.controllers.calibration.hysteresis import play_outputs
 from pneuarm.controllers.calibration.model import TipModel
 from pneuarm.controllers.calibration.parameters import NAMES, SHAPING, arm_of, start_of
@@ -24,6 +24,7 @@ from pneuarm.controllers.calibration.recording import (
     settled,
 )
 from pneuarm.controllers.calibration.response import fit_response
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from pneuarm.service.configuration.configuration import load
 from tests.controllers.calibration.synthetic import (
     COARSE_S,
@@ -79,7 +80,7 @@ def test_the_fit_finds_the_parameters_that_made_the_recording() -> None:
 def test_the_fit_finds_the_frames_of_the_measurement_too() -> None:
     recording = quiet_recording("paper")
     frames = Frames(
-        rotation_of(np.array([0.3, -0.8, 1.9])),
+        rotation_from_vector(np.array([0.3, -0.8, 1.9])),
         np.array([0.5, -0.2, 1.1]),
         np.array([0.0, 0.01, 0.02]),
     )
@@ -250,7 +251,10 @@ def test_a_play_holds_until_it_is_pushed_and_its_slope_is_its_derivative() -> No
 def test_a_rigid_motion_is_found_again() -> None:
     rng = np.random.default_rng(3)
     tips = rng.normal(0.0, 0.1, (30, 3))
-    rotation, translation = rotation_of(np.array([1.0, 2.0, -0.5])), np.array([1.0, 0.0, -2.0])
+    rotation, translation = (
+        rotation_from_vector(np.array([1.0, 2.0, -0.5])),
+        np.array([1.0, 0.0, -2.0]),
+    )
     found = aligned(tips, tips @ rotation.T + translation)
     np.testing.assert_allclose(found.rotation, rotation, atol=1e-12)
     np.testing.assert_allclose(found.translation_m, translation, atol=1e-12)
@@ -258,10 +262,12 @@ def test_a_rigid_motion_is_found_again() -> None:
 
 def test_the_derivative_over_the_frames_is_that_of_the_position() -> None:
     rng = np.random.default_rng(4)
-    pose = np.concatenate([rng.normal(0, 0.1, 3), rotation_of(rng.normal(0, 1, 3)).reshape(-1)])[
-        None
-    ]
-    frames = Frames(rotation_of(rng.normal(0, 1, 3)), rng.normal(0, 1, 3), rng.normal(0, 0.02, 3))
+    pose = np.concatenate(
+        [rng.normal(0, 0.1, 3), rotation_from_vector(rng.normal(0, 1, 3)).reshape(-1)]
+    )[None]
+    frames = Frames(
+        rotation_from_vector(rng.normal(0, 1, 3)), rng.normal(0, 1, 3), rng.normal(0, 0.02, 3)
+    )
     derivative = frames.over_frames(pose)[0]
     for index in range(9):
         change = np.zeros(9)

@@ -12,7 +12,7 @@ from pneuarm.controllers.calibration.calibrate import calibrate
 from pneuarm.controllers.calibration.fit import Fit
 from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.controllers.calibration.worth import LARGEST_SHARE, held_out_mean_m
-from pneuarm.controllers.geometry.frames import rotation_from_vector
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from tests.controllers.calibration.synthetic import COARSE_S, PAPER, other_arm, short_plan
 from tools.rig.foreign_arms import ForeignArm, recording_of, rod_of, sent_by
 

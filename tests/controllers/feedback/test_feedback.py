@@ -5,7 +5,7 @@ import pytest
 
 from pneuarm.controllers.feedback.estimator import EstimateSource, Estimator
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
-from pneuarm.controllers.geometry.frames import rotation_from_vector
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from pneuarm.controllers.kinematics.compiled import CompiledKinematics
 from tools.rig.arms import paper_arm
 

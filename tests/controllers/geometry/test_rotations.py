@@ -8,8 +8,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.tasks.rows import symbolic_rotation_vector
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation, rotation_from_quaternion
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    symbolic_rotation_vector,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 #: From no turn over the thresholds of the formulas to half a turn.

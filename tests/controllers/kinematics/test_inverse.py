@@ -18,7 +18,7 @@ from pneuarm.controllers.kinematics.inverse import (
     within_limits,
 )
 from pneuarm.controllers.kinematics.parameters import in_frame
-from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.limits.bend import BendLimit
 from tools.rig.arms import ARMS, PAPER_SECTION, paper_arm, random_lengths, trunk_arm
 
 #: Bends as far as the box of Eq. (4) goes.
@@ -87,7 +87,7 @@ def test_poses_out_of_reach_give_lengths_within_the_limits(
 ) -> None:
     found = inverse(arm, shifted(np.eye(4), offset_m))
     assert found.position_residual_m > 1e-3 or found.rotation_residual_rad > 1e-3
-    assert (Limits(arm).bend.slack_m(found.lengths_m) > -1e-9).all()
+    assert (BendLimit(arm).left_m(found.lengths_m) > -1e-9).all()
     assert (found.lengths_m > arm.per_chamber("length_min_m")).all()
     assert (found.lengths_m < arm.per_chamber("length_max_m")).all()
 
@@ -158,7 +158,7 @@ def test_limits_move_only_what_is_outside(arm: Arm) -> None:
     assert (outside > arm.per_chamber("length_min_m")).all()
     assert (outside < arm.per_chamber("length_max_m")).all()
     for lengths in outside:
-        assert (Limits(arm).bend.slack_m(lengths) > -1e-12).all()
+        assert (BendLimit(arm).left_m(lengths) > -1e-12).all()
 
 
 def cost(arm: Arm, lengths: np.ndarray, pose: np.ndarray) -> np.ndarray:

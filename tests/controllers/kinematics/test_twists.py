@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller, Reach
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import TwistTarget
 from tests.controllers.laws.driving import DT_S, starting_at
 from tools.rig.arms import ARMS, random_lengths, trunk_arm

@@ -7,14 +7,15 @@ import pytest
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm, Array, KeepOut, Sphere
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import (
     section_end_transforms,
     section_transforms,
     shapes_from_lengths,
     tip_transform,
 )
-from pneuarm.controllers.laws.controller import Controller, Reach
 from pneuarm.controllers.laws.settings import ControlSettings
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import LawName, PositionTarget, Target
 from tools.rig.arms import ARMS
 
@@ -97,7 +98,7 @@ def clearance_m(arm: Arm, lengths: Array, place: KeepOut) -> float:
 
 def run(arm: Arm, controller: Controller, target: Target, seconds: float = 8.0) -> None:
     """Follow a target; no tick may leave a limit."""
-    before, rates = controller.lengths_m.copy(), controller._motion.rates_m_s
+    before, rates = controller.lengths_m.copy(), controller._chambers.rates_m_s
     for lengths in path(arm, controller, target, seconds):
         rates = assert_within_limits(arm, before, lengths, rates)
         before = lengths

@@ -7,9 +7,10 @@ import pytest
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Controller, Reach
 from pneuarm.controllers.laws.solve_ik import IkSolver
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import LawName, LengthsTarget, PositionTarget
 from tests.controllers.laws.driving import (
     SETTINGS,

@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Arm, HalfSpace, Sphere
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
-from pneuarm.controllers.laws.controller import Binding, Controller, Reach
-from pneuarm.controllers.limits.consistency import refuse_contradictions
+from pneuarm.controllers.limits.keep_out import KeepOutLimit
+from pneuarm.controllers.limits.limits import refuse_contradictions
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import (
     DirectionTarget,
     LawName,
@@ -66,7 +68,7 @@ def test_no_limit_is_exceeded_whatever_is_asked_for(arm: Arm, seed: int) -> None
     rng = np.random.default_rng(seed)
     controller = controller_of(arm)
     controller.start_from(np.zeros((arm.n_sections, 3)))
-    before, rates = controller.lengths_m, controller._motion.rates_m_s
+    before, rates = controller.lengths_m, controller._chambers.rates_m_s
     for _ in range(6):
         controller.set_target(garbage(arm, rng))
         for _ in range(int(rng.integers(1, 25))):  # the next one comes at full speed
@@ -138,7 +140,7 @@ def test_braking_is_part_of_every_stop() -> None:
     controller.set_target(PositionTarget(np.array([0.08, 0.0, 0.25])))
     for _ in range(40):
         controller.step(DT_S)
-    before, rates = controller.lengths_m, controller._motion.rates_m_s
+    before, rates = controller.lengths_m, controller._chambers.rates_m_s
     assert np.abs(rates).max() > 0.05
     controller.set_target(None)
     for _ in range(20):
@@ -154,7 +156,7 @@ def test_the_arm_goes_up_to_a_keep_out_and_says_that_it_binds(name: str) -> None
     controller = starting_at(arm, arm.rest_lengths_m)
     run(arm, controller, PositionTarget(np.array([0.09, 0.0, 0.17])))
     assert controller.reach == Reach.OUT_OF_REACH
-    assert Binding.KEEP_OUT in controller.binding()
+    assert controller.binding() & KeepOutLimit.bit
 
 
 def test_the_tip_slides_along_a_wall() -> None:
@@ -178,13 +180,13 @@ def test_an_arm_inside_a_keep_out_may_leave_it_and_goes_no_deeper() -> None:
     arm = KEPT_OUT["wall"]
     bent = random_lengths(arm, np.random.default_rng(0), 0.2)
     bent[0] = [0.16, 0.24, 0.24]
-    controller = starting_at(arm, bent)
-    left = controller._limits.keep_out.left_m(controller.lengths_m).min()
+    controller, keep_out = starting_at(arm, bent), KeepOutLimit(arm)
+    left = keep_out.left_m(controller.lengths_m).min()
     assert left < -0.005
     for x in (0.09, 0.0):
         controller.set_target(PositionTarget(np.array([x, 0.0, 0.2])))
         for _ in range(400):
             controller.step(DT_S)
-            now = controller._limits.keep_out.left_m(controller.lengths_m).min()
+            now = keep_out.left_m(controller.lengths_m).min()
             assert now >= min(left, 0.0) - 1e-9
     assert now > 0.0

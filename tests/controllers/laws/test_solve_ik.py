@@ -10,9 +10,11 @@ from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.compiled import CompiledKinematics
 from pneuarm.controllers.laws.solve_ik import DAMPING, IkBuilder, IkProblem, IkSolver
+from pneuarm.controllers.limits.bend import BendLimit
+from pneuarm.controllers.limits.length import LengthLimit
 from pneuarm.controllers.limits.limits import Limits
-from pneuarm.controllers.tasks.task import fill
-from pneuarm.controllers.tasks.tip_twist import TipTwist
+from pneuarm.controllers.targets.targets import PARTS
+from pneuarm.controllers.targets.twist import TwistTarget
 from pneuarm.controllers.tasks.wanted import Wanted
 from tools.rig.arms import ARMS, paper_arm, random_lengths
 
@@ -27,16 +29,16 @@ class Bench:
         self.arm, self.limits = arm, Limits(arm)
         self.builder = IkBuilder(arm, self.limits, whole=True)
         self.lengths, self.rates = np.zeros(arm.n_chambers), np.zeros(arm.n_chambers)
-        self.wanted, self.dt_s = Wanted(arm.n_chambers), np.full(1, DT_S)
+        self.wanted, self.dt_s = Wanted(arm.n_chambers, PARTS), np.full(1, DT_S)
         self.builder.function.bind([self.lengths, self.rates, self.wanted.values, self.dt_s])
         self.solver = IkSolver(arm.n_chambers, self.builder.pattern)
         self.kinematics = CompiledKinematics(arm)
 
     def build(self, lengths: Array, velocity_m_s: Array, gain_per_s: float = 30.0) -> IkProblem:
         self.lengths[:] = lengths.reshape(-1)
-        fill(self.wanted, TipTwist(velocity_m_s, None, False, False), gain_per_s, 1.0)
+        TwistTarget(velocity_m_s, None, False, False).ask(self.wanted, gain_per_s, 1.0)
         self.wanted["posture_weight"] = 0.0
-        self.builder.function.call()
+        self.builder.function.evaluate()
         problem = self.builder.problem
         return replace(problem, **{name: getattr(problem, name).copy() for name in ARRAYS})
 
@@ -112,7 +114,7 @@ def test_a_step_to_a_row_approaches_its_bound_as_a_target_on_it(arm: Arm) -> Non
     n = arm.n_chambers
     low, high = length_bounds_m(arm)
     before = np.concatenate([(lengths - low).reshape(-1), (high - lengths).reshape(-1)])
-    margin_m = bench.limits.length.margin_m
+    margin_m = LengthLimit.margin_m
     for x, left, sign in (
         (problem.lower[:n], before[:n], 1.0),
         (problem.upper[:n], before[n:], -1),
@@ -120,12 +122,13 @@ def test_a_step_to_a_row_approaches_its_bound_as_a_target_on_it(arm: Arm) -> Non
         after = left + sign * step_m * x
         # The pressure may be tighter than the length, never wider.
         assert (after >= left - share * (left - margin_m) - 1e-12).all()
+    bend = BendLimit(arm)
     for section in range(arm.n_sections):
         row, upper = problem.A[n + section], problem.upper[n + section]
         size = 1e-4
         moved = lengths + (size * step_m * row / (row @ row)).reshape(lengths.shape)
-        slack, nearer = bench.limits.bend.slack_m(lengths), bench.limits.bend.slack_m(moved)
-        left = slack[section] - bench.limits.bend.margin_m
+        slack, nearer = (bend.left_m(each).copy() for each in (lengths, moved))
+        left = slack[section] - bend.margin_m
         if slack[section] < 0.9 * (slack + 1.0)[section] and left > 1e-3:
             assert (slack - nearer)[section] / size * upper == pytest.approx(share * left, rel=1e-2)
 

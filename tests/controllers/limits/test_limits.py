@@ -13,8 +13,10 @@ from pneuarm.controllers.arm.arm import Arm, Array, HalfSpace, Sphere
 from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
 from pneuarm.controllers.limits.bend import BendLimit
 from pneuarm.controllers.limits.keep_out import KeepOutLimit
+from pneuarm.controllers.limits.length import LengthLimit
 from pneuarm.controllers.limits.limit import Limit
-from pneuarm.controllers.limits.limits import Limits
+from pneuarm.controllers.limits.limits import KINDS, Limits, names
+from pneuarm.controllers.limits.pressure import PressureLimit
 from tests.controllers.laws.driving import clearance_m
 from tools.rig.arms import ARMS, random_lengths
 
@@ -49,19 +51,19 @@ def evaluated(limit: Limit, arm: Arm, lengths: Array) -> Array:
 @pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
 @pytest.mark.parametrize("seed", range(20))
 def test_the_slack_of_every_limit_is_what_is_left_of_it(arm: Arm, seed: int) -> None:
-    limits, lengths = Limits(arm), random_lengths(arm, np.random.default_rng(seed))
+    lengths = random_lengths(arm, np.random.default_rng(seed))
     low, high = length_bounds_m(arm)
     expected = np.concatenate([(lengths - low).reshape(-1), (high - lengths).reshape(-1)])
-    np.testing.assert_allclose(evaluated(limits.length, arm, lengths), expected, atol=1e-15)
+    np.testing.assert_allclose(evaluated(LengthLimit(arm), arm, lengths), expected, atol=1e-15)
     left = arm.per_section("bend_max_rad")[:, 0] - bend_rad(arm, lengths)
     slack = left * arm.per_section("chamber_offset_m")[:, 0]
-    np.testing.assert_allclose(evaluated(limits.bend, arm, lengths), slack, atol=1e-12)
-    np.testing.assert_allclose(limits.bend.slack_m(lengths), slack, atol=1e-15)
+    np.testing.assert_allclose(evaluated(BendLimit(arm), arm, lengths), slack, atol=1e-12)
+    np.testing.assert_allclose(BendLimit(arm).left_m(lengths), slack, atol=1e-12)
     pressures = PressureMap(arm).pressures_pa(lengths)
     bounds = [arm.per_chamber(name) for name in ("pressure_min_pa", "pressure_max_pa")]
     both = np.concatenate([pressures - bounds[0], bounds[1] - pressures]).reshape(-1)
     metres = np.tile(arm.per_chamber("lengthening_m_per_pa").reshape(-1), 2)
-    found = evaluated(limits.pressure, arm, lengths)
+    found = evaluated(PressureLimit(arm), arm, lengths)
     np.testing.assert_allclose(found, metres * both, atol=1e-12)
 
 
@@ -104,3 +106,14 @@ def test_unbending_keeps_the_length_bounds_that_held_before(arm: Arm, seed: int)
     assert (clipped < arm.per_chamber("length_max_m")).all()
     assert (bend_rad(arm, clipped) <= arm.per_section("bend_max_rad")[:, 0] + 1e-12).all()
     np.testing.assert_allclose(limits.clip(clipped), clipped, atol=1e-15)
+
+
+def test_every_limit_has_a_name_and_a_bit_of_its_own() -> None:
+    assert {kind.bit: kind.name for kind in KINDS} == {
+        1: "length",
+        2: "bend",
+        4: "pressure",
+        8: "keep-out",
+    }
+    assert names(0) == ()
+    assert set(names(2 | 8)) == {"bend", "keep-out"}

@@ -1,6 +1,7 @@
 """The reference over targets of all kinds: continuous, streams without lag, poses too."""
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,19 +10,17 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Response
 from pneuarm.controllers.feedback.prediction import discrete
-from pneuarm.controllers.geometry.frames import rotation_from_vector
+from pneuarm.controllers.geometry.rotations import quaternion_from_rotation, rotation_from_vector
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.reference.follower import Follower, Lead, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.controllers.targets.shapes import Circle
 from pneuarm.controllers.targets.targets import CircleTarget, PoseTarget, PositionTarget, Target
-from pneuarm.controllers.tasks.tip_pose import quaternion_from_rotation
 
 LIMITS = ReferenceLimits(0.5, 4.0, 80.0)
 DT_S = 1e-3
 HOME = TipState(np.array([0.0, 0.0, 0.2]), np.eye(3), np.zeros((6, 3)))
 RESPONSE = Response(0.007, 0.01, 2.2, 0.13)
-CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25, 1.0)
+CIRCLE = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25, 1.0)
 
 
 class Drive:
@@ -77,7 +76,7 @@ def test_no_change_of_target_jumps_in_position_or_velocity(steps: list) -> None:
         elif kind == "pose":
             drive.set(pose(5 * x, (x, y, 0.2)))
         else:
-            drive.set(CircleTarget(CIRCLE, number))
+            drive.set(replace(CIRCLE, id=number))
         drive.run(ticks)
     # A jump of the velocity by 5 mm/s would be an acceleration of 5 m/s^2 for one tick.
     assert drive.accelerations().max() < LIMITS.acceleration_m_s2 * 1.15
@@ -156,13 +155,13 @@ def test_a_single_far_target_is_no_stream() -> None:
 def test_a_shape_sent_again_goes_on_and_stands_at_its_end() -> None:
     drive = Drive()
     for number in range(480):
-        drive.set(CircleTarget(CIRCLE, 7))
+        drive.set(replace(CIRCLE, id=7))
         if number == 200:
             assert drive.positions[-1] == pytest.approx(CIRCLE.at(2.0).position, abs=1e-3)
         drive.run(10)
     assert drive.follower.arrived
     assert drive.positions[-1] == pytest.approx([0.04, 0.0, 0.2], abs=1e-9)
-    drive.set(CircleTarget(CIRCLE, 8))
+    drive.set(replace(CIRCLE, id=8))
     drive.run(200)
     assert not drive.follower.arrived
 

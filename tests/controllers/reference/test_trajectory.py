@@ -5,14 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pneuarm.controllers.geometry.moving_point import MovingPoint
 from pneuarm.controllers.reference.trajectory import (
     Goal,
-    Motion,
     Reference,
     ReferenceLimits,
     standing,
 )
-from pneuarm.controllers.targets.shapes import Circle, Line, Waypoints, perpendicular
+from pneuarm.controllers.targets.shape import ShapeTarget, perpendicular
+from pneuarm.controllers.targets.targets import CircleTarget, LineTarget, TrajectoryTarget
 
 LIMITS = ReferenceLimits(0.4, 3.0, 50.0)
 DT_S = 2e-3
@@ -30,7 +31,7 @@ def moving(position: tuple[float, ...], velocity: tuple[float, ...] | None) -> G
     if velocity is None:
         return standing(list(position))
     known = list(velocity)
-    return lambda ahead_s: Motion(
+    return lambda ahead_s: MovingPoint(
         [p + v * ahead_s for p, v in zip(position, known, strict=True)], known, [0.0] * 3
     )
 
@@ -57,7 +58,7 @@ def test_random_targets_never_exceed_a_limit_and_never_jump(targets: list) -> No
 def test_a_circle_is_met_and_then_followed_exactly() -> None:
     reference = Reference(LIMITS)
     reference.start([0.0, 0.0, 0.2])
-    circle = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25)
+    circle = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25)
     reference.go(circle.at)
     for _ in range(1000):
         motion = reference.step(DT_S)
@@ -76,17 +77,17 @@ def test_a_goal_that_is_no_number_is_not_taken_and_said() -> None:
     assert motion.position == pytest.approx([0.1, 0.0, 0.0])
 
 
-def _shapes() -> list[Circle | Line | Waypoints]:
+def _shapes() -> list[ShapeTarget]:
     first, second = perpendicular(np.array([0.3, 0.2, 0.9]))
     return [
-        Circle((0.0, 0.1, 0.2), tuple(first), tuple(second), 0.03, 0.5, 2.0),
-        Line((0.0, 0.0, 0.2), (0.05, -0.02, 0.19), 2.0, 3.0),
-        Waypoints((0.5, 1.0, 2.2), ((0.0, 0.0, 0.2), (0.03, 0.0, 0.2), (0.0, 0.03, 0.19))),
+        CircleTarget((0.0, 0.1, 0.2), tuple(first), tuple(second), 0.03, 0.5, 2.0),
+        LineTarget((0.0, 0.0, 0.2), (0.05, -0.02, 0.19), 2.0, 3.0),
+        TrajectoryTarget((0.5, 1.0, 2.2), ((0.0, 0.0, 0.2), (0.03, 0.0, 0.2), (0.0, 0.03, 0.19))),
     ]
 
 
 @pytest.mark.parametrize("shape", _shapes(), ids=lambda shape: type(shape).__name__)
-def test_velocity_and_acceleration_of_shapes_are_the_derivatives(shape: Circle) -> None:
+def test_velocity_and_acceleration_of_shapes_are_the_derivatives(shape: ShapeTarget) -> None:
     step = 1e-5
     for time in np.linspace(0.0, shape.duration_s + 0.1, 40):
         before, now, after = (shape.at(time + d) for d in (-step, 0.0, step))
@@ -99,7 +100,7 @@ def test_velocity_and_acceleration_of_shapes_are_the_derivatives(shape: Circle) 
 
 def test_waypoints_are_passed_at_their_times_and_rest_at_the_ends() -> None:
     shape = _shapes()[2]
-    assert isinstance(shape, Waypoints)
+    assert isinstance(shape, TrajectoryTarget)
     for time, point in zip(shape.times_s, shape.positions_m, strict=True):
         assert shape.at(time).position == pytest.approx(point)
     assert shape.at(0.0).position == list(shape.positions_m[0])

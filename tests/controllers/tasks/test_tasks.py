@@ -8,25 +8,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.geometry.rotations import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 from pneuarm.controllers.kinematics.constant_curvature import (
     section_transforms,
     shapes_from_lengths,
 )
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform as tip_of
-from pneuarm.controllers.laws.motion import Motion
-from pneuarm.controllers.tasks.backbone_point import BackbonePoint
-from pneuarm.controllers.tasks.chamber_lengths import ChamberLengths, Posture
-from pneuarm.controllers.tasks.rows import Rows, symbolic_rows
-from pneuarm.controllers.tasks.task import Combined, Task, fill
-from pneuarm.controllers.tasks.tip_direction import TipDirection
-from pneuarm.controllers.tasks.tip_pose import (
-    TipPose,
-    quaternion_from_rotation,
-    rotation_from_quaternion,
+from pneuarm.controllers.laws.commanded_chambers import CommandedChambers
+from pneuarm.controllers.targets.targets import (
+    PARTS,
+    ROWS,
+    DirectionTarget,
+    LengthsTarget,
+    PointTarget,
+    PoseTarget,
+    PositionTarget,
+    PostureTarget,
+    Target,
+    TasksTarget,
+    TwistTarget,
 )
-from pneuarm.controllers.tasks.tip_position import TipPosition
-from pneuarm.controllers.tasks.tip_twist import TipTwist
+from pneuarm.controllers.tasks.rows import Rows, symbolic_rows
 from pneuarm.controllers.tasks.wanted import ORIENTATION_LENGTH_M, Wanted, symbols
 from tools.rig.arms import ARMS, random_lengths, trunk_arm
 
@@ -44,15 +51,15 @@ every_goal = pytest.mark.parametrize("kind", GOALS)
 @cache
 def compiled(arm: Arm) -> ca.Function:
     lengths = ca.SX.sym("lengths", arm.n_chambers)
-    vector, want = symbols(arm.n_chambers)
-    rows = symbolic_rows(arm, lengths, want, whole=True)
+    vector, want = symbols(arm.n_chambers, PARTS)
+    rows = symbolic_rows(arm, lengths, want, ROWS, whole=True)
     return ca.Function("rows", [lengths, vector], ca.cse(list(rows)))
 
 
-def rows_at(arm: Arm, lengths: Array, task: Task, correction: Array | None = None) -> Rows:
+def rows_at(arm: Arm, lengths: Array, task: Target, correction: Array | None = None) -> Rows:
     """Rows of a task as numpy arrays; vectors are flat."""
-    wanted = Wanted(arm.n_chambers)
-    fill(wanted, task, 30.0, 1.0)
+    wanted = Wanted(arm.n_chambers, PARTS)
+    task.ask(wanted, 30.0, 1.0)
     if correction is not None:
         wanted.correct(correction[:3, 3], correction[:3, :3])
     results = [np.array(part) for part in compiled(arm)(lengths.reshape(-1), wanted.values)]
@@ -69,21 +76,31 @@ def point_at(arm: Arm, lengths: Array, station: float) -> Array:
     return transform[:3, 3]
 
 
-def task_with_goal(kind: str, arm: Arm, goal: Array) -> Task:
+def pose_of(position_m: Array, rotation: Array) -> PoseTarget:
+    return PoseTarget(position_m, quaternion_from_rotation(rotation))
+
+
+def task_with_goal(kind: str, arm: Arm, goal: Array) -> Target:
     tip = tip_of(arm, goal)
-    point = BackbonePoint(point_at(arm, goal, 0.6), 0.6, 2.0)
+    point = PointTarget(point_at(arm, goal, 0.6), 0.6, weight=2.0)
     match kind:
         case "position":
-            return TipPosition(tip[:3, 3])
+            return PositionTarget(tip[:3, 3])
         case "pose":
-            return TipPose(tip[:3, 3], tip[:3, :3], 2.0, 0.5)
+            return PoseTarget(
+                tip[:3, 3],
+                quaternion_from_rotation(tip[:3, :3]),
+                weight=2.0,
+                orientation_weight=0.5,
+            )
         case "direction":
-            return TipDirection(tip[:3, 2], 3.0)
+            return DirectionTarget(tip[:3, 2], weight=3.0)
         case "point":
             return point
         case "combined":
-            return Combined((TipPosition(tip[:3, 3]), TipDirection(tip[:3, 2], 0.3), point))
-    return ChamberLengths(goal)
+            direction = DirectionTarget(tip[:3, 2], weight=0.3)
+            return TasksTarget((PositionTarget(tip[:3, 3]), direction, point))
+    return LengthsTarget(goal)
 
 
 @every_arm
@@ -132,13 +149,13 @@ def test_following_a_task_comes_closer(kind: str, arm: Arm, seed: int) -> None:
     assert motion.error_m < 0.1 * before
 
 
-motion_of = cache(Motion)
+motion_of = cache(CommandedChambers)
 
 
 def test_the_error_of_a_position_is_the_distance() -> None:
     arm = trunk_arm()
     tip = tip_of(arm, arm.rest_lengths_m)[:3, 3]
-    task = TipPosition(tip + np.array([0.03, 0.0, -0.04]), weight=7.0)
+    task = PositionTarget(tip + np.array([0.03, 0.0, -0.04]), weight=7.0)
     assert rows_at(arm, arm.rest_lengths_m, task).error_m == pytest.approx(0.05)
 
 
@@ -152,7 +169,7 @@ def test_the_error_of_a_pose_is_the_angle_times_its_length(
     arm, vector = trunk_arm(), np.array(axis)
     tip = tip_of(arm, arm.rest_lengths_m)
     quaternion = np.append(np.sin(0.5 * angle) * vector, np.cos(0.5 * angle))
-    task = TipPose(tip[:3, 3], rotation_from_quaternion(quaternion) @ tip[:3, :3])
+    task = pose_of(tip[:3, 3], rotation_from_quaternion(quaternion) @ tip[:3, :3])
     rows = rows_at(arm, arm.rest_lengths_m, task)
     turn = rows.error[3:6] / ORIENTATION_LENGTH_M
     assert rows.error_m == pytest.approx(ORIENTATION_LENGTH_M * angle, abs=1e-9)
@@ -164,7 +181,7 @@ def test_the_error_of_a_pose_is_the_angle_times_its_length(
 def test_the_error_of_a_direction_is_the_angle_and_roll_is_free(angle: float) -> None:
     arm = trunk_arm()
     direction = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    rows = rows_at(arm, arm.rest_lengths_m, TipDirection(direction))
+    rows = rows_at(arm, arm.rest_lengths_m, DirectionTarget(direction))
     assert rows.error_m == pytest.approx(ORIENTATION_LENGTH_M * angle, abs=1e-9)
     np.testing.assert_allclose(rows.jacobian[5], 0.0, atol=1e-15)  # about its own axis
 
@@ -174,7 +191,7 @@ def test_the_error_of_lengths_is_the_worst_chamber() -> None:
     goal = arm.rest_lengths_m.copy()
     goal[1, 2] += 0.007
     goal[2, 0] -= 0.004
-    rows = rows_at(arm, arm.rest_lengths_m, ChamberLengths(goal))
+    rows = rows_at(arm, arm.rest_lengths_m, LengthsTarget(goal))
     assert rows.error_m == pytest.approx(0.007)
 
 
@@ -183,7 +200,7 @@ def test_the_error_of_lengths_is_the_worst_chamber() -> None:
 def test_a_point_of_the_backbone_is_where_it_is(arm: Arm, seed: int, station: float) -> None:
     lengths = random_lengths(arm, np.random.default_rng(seed))
     wanted = np.array([0.01, -0.02, 0.03])
-    rows = rows_at(arm, lengths, BackbonePoint(wanted, station))
+    rows = rows_at(arm, lengths, PointTarget(wanted, station))
     np.testing.assert_allclose(rows.error[6:], wanted - point_at(arm, lengths, station), atol=1e-13)
 
 
@@ -196,7 +213,7 @@ def test_a_correction_moves_and_turns_the_tip_that_is_seen(arm: Arm, seed: int) 
     correction[:3, :3] = rotation_from_quaternion(quaternion / np.linalg.norm(quaternion))
     correction[:3, 3] = 0.05 * rng.standard_normal(3)
     tip = tip_of(arm, lengths)
-    task = TipPose(tip[:3, 3] + correction[:3, 3], correction[:3, :3] @ tip[:3, :3])
+    task = pose_of(tip[:3, 3] + correction[:3, 3], correction[:3, :3] @ tip[:3, :3])
     rows = rows_at(arm, lengths, task, correction)
     assert rows.error_m == pytest.approx(0.0, abs=1e-9)
     plain = rows_at(arm, lengths, task).jacobian
@@ -212,7 +229,7 @@ def test_a_twist_is_the_motion_of_the_body_point_at_the_reference(
     arm = trunk_arm()
     lengths = random_lengths(arm, np.random.default_rng(5))
     tip = tip_of(arm, lengths)
-    rows = rows_at(arm, lengths, TipTwist(LINEAR, ANGULAR, in_tip_frame, about_base_origin))
+    rows = rows_at(arm, lengths, TwistTarget(LINEAR, ANGULAR, in_tip_frame, about_base_origin))
     frame = tip[:3, :3] if in_tip_frame else np.eye(3)
     spin = rows.velocity[3:6] / ORIENTATION_LENGTH_M
     np.testing.assert_allclose(spin, frame @ ANGULAR)
@@ -231,7 +248,7 @@ def test_a_position_that_moves_is_followed_without_lag() -> None:
     position = motion.tip.position_m.copy()
     errors = []
     for _ in range(1000):
-        motion.ask(TipPosition(position, velocity), 30.0, 0.3)
+        motion.ask(PositionTarget(position, velocity_m_s=velocity), 30.0, 0.3)
         motion.step(motion.qp_ik, dt_s)
         position = position + velocity * dt_s
         errors.append(float(np.linalg.norm(position - motion.tip.position_m)))
@@ -243,12 +260,12 @@ def test_posture_uses_what_the_tip_leaves_and_the_tip_stands_still() -> None:
     arm = trunk_arm()
     rng = np.random.default_rng(3)
     motion = motion_of(arm)
-    middle = 0.5 * (motion.limits.length.lower_m + motion.limits.length.upper_m)
+    middle = 0.5 * sum(length_bounds_m(arm))
     for _ in range(3):
         start = random_lengths(arm, rng, 0.7)
         motion.place(start)
         tip = motion.tip.position_m.copy()
-        motion.ask(TipPosition(tip), 30.0, 0.3)
+        motion.ask(PositionTarget(tip), 30.0, 0.3)
         for _ in range(1500):
             motion.step(motion.qp_ik, 5e-3)
             assert np.linalg.norm(motion.tip.position_m - tip) < 1e-4
@@ -264,7 +281,8 @@ def test_weights_decide_the_compromise_between_tasks() -> None:
     for weight in (0.1, 1.0, 10.0):
         motion = motion_of(arm)
         motion.place(second)
-        motion.ask(Combined((TipPosition(first, weight=weight), ChamberLengths(second))), 30.0, 0.3)
+        both = PositionTarget(first, weight=weight), LengthsTarget(second)
+        motion.ask(TasksTarget(both), 30.0, 0.3)
         for _ in range(300):
             motion.step(motion.qp_ik, 5e-3)
         distances.append(float(np.linalg.norm(first - motion.tip.position_m)))
@@ -272,8 +290,8 @@ def test_weights_decide_the_compromise_between_tasks() -> None:
 
 
 def test_posture_alone_asks_for_nothing_else() -> None:
-    wanted = Wanted(9)
-    fill(wanted, Posture(0.5), 30.0, 0.3)
+    wanted = Wanted(9, PARTS)
+    PostureTarget(weight=0.5).ask(wanted, 30.0, 0.3)
     assert wanted["posture_weight"] == 0.5
     assert not wanted["position_weight"].any()
 

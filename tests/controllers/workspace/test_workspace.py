@@ -16,8 +16,10 @@ from pneuarm.controllers.kinematics.constant_curvature import (
     section_transforms,
     shapes_from_lengths,
 )
-from pneuarm.controllers.laws.controller import Binding
-from pneuarm.controllers.limits.limits import AT_BOUND_M, Limits
+from pneuarm.controllers.limits.bend import BendLimit
+from pneuarm.controllers.limits.length import LengthLimit
+from pneuarm.controllers.limits.limit import AT_BOUND_M
+from pneuarm.controllers.limits.pressure import PressureLimit
 from pneuarm.controllers.workspace.reachability import LimitNames
 from pneuarm.controllers.workspace.region import WEDGE_RAD, SectionRegion, Sheet, folded, unfolded
 from pneuarm.controllers.workspace.workspace import SolvedRegion, Workspace
@@ -58,7 +60,7 @@ def test_tips_of_lengths_within_the_limits_are_members(name: str, seed: int) -> 
     lengths = random_lengths(arm, np.random.default_rng(seed))
     answer = WORKSPACES[name].is_reachable(tip(arm, lengths))
     assert answer.reachable
-    assert answer.limits == Binding.NOTHING
+    assert answer.limits == 0
     assert answer.distance_m == 0.0
     np.testing.assert_array_equal(answer.nearest_m, tip(arm, lengths))
 
@@ -78,10 +80,10 @@ def test_lengths_beyond_a_limit_give_no_member_and_their_limit_is_named(
     lengths[0, chamber] = bound[0, chamber] + (beyond if up else -beyond)
     answer = workspace.is_reachable(tip(arm, lengths))
     assert not answer.reachable
-    assert answer.limits != Binding.NOTHING
+    assert answer.limits != 0
     assert answer.distance_m > 0.0
     assert isinstance(workspace.region, SolvedRegion)
-    wanted = Binding.PRESSURE if name == "table1" else Binding.LENGTH
+    wanted = PressureLimit.bit if name == "table1" else LengthLimit.bit
     assert wanted in workspace.region.exceeded(tip(arm, lengths))
 
 
@@ -95,7 +97,7 @@ def test_a_bend_beyond_its_limit_gives_no_member(angle: float, beyond: float) ->
         region = WORKSPACES["paper"].region
         assert isinstance(region, SolvedRegion)
         assert WORKSPACES["paper"].contains(position) == reachable
-        assert region.exceeded(position) == (Binding.NOTHING if reachable else Binding.BEND)
+        assert region.exceeded(position) == (0 if reachable else BendLimit.bit)
 
 
 @every_section
@@ -161,16 +163,16 @@ def test_no_member_at_random_is_nearer_than_the_nearest_point(name: str) -> None
 @pytest.mark.parametrize(
     ("name", "position", "nearest", "limits"),
     [
-        ("paper", (0.0, 0.0, 0.5), (0.0, 0.0, 0.299999), Binding.LENGTH),
-        ("paper", (0.0, 0.0, 0.05), (0.0, 0.0, 0.100001), Binding.LENGTH),
-        ("paper", (0.0, 0.0, 0.3), (0.0, 0.0, 0.299999), Binding.LENGTH),
-        ("paper", (0.0, 0.0, 0.0), (0.0, 0.0, 0.100001), Binding.LENGTH),
-        ("table1", (0.0, 0.0, 0.1), (0.0, 0.0, 0.17172), Binding.PRESSURE),
-        ("table1", (0.0, 0.0, 0.5), (0.0, 0.0, 0.225903), Binding.PRESSURE),
+        ("paper", (0.0, 0.0, 0.5), (0.0, 0.0, 0.299999), LengthLimit.bit),
+        ("paper", (0.0, 0.0, 0.05), (0.0, 0.0, 0.100001), LengthLimit.bit),
+        ("paper", (0.0, 0.0, 0.3), (0.0, 0.0, 0.299999), LengthLimit.bit),
+        ("paper", (0.0, 0.0, 0.0), (0.0, 0.0, 0.100001), LengthLimit.bit),
+        ("table1", (0.0, 0.0, 0.1), (0.0, 0.0, 0.17172), PressureLimit.bit),
+        ("table1", (0.0, 0.0, 0.5), (0.0, 0.0, 0.225903), PressureLimit.bit),
     ],
 )
 def test_the_nearest_point_on_the_axis_is_at_the_end_of_the_travel(
-    name: str, position: tuple[float, ...], nearest: tuple[float, ...], limits: Binding
+    name: str, position: tuple[float, ...], nearest: tuple[float, ...], limits: int
 ) -> None:
     answer = WORKSPACES[name].is_reachable(position)
     assert not answer.reachable
@@ -179,22 +181,22 @@ def test_the_nearest_point_on_the_axis_is_at_the_end_of_the_travel(
 
 
 def test_a_target_that_only_bends_too_far_is_stopped_by_the_bend() -> None:
-    assert WORKSPACES["paper"].is_reachable((0.19, 0.0, 0.0)).limits == Binding.BEND
+    assert WORKSPACES["paper"].is_reachable((0.19, 0.0, 0.0)).limits == BendLimit.bit
 
 
 @every_section
 def test_the_limits_are_those_that_the_lengths_at_the_nearest_point_touch(name: str) -> None:
-    arm, rng, seen = ONE_SECTION[name], np.random.default_rng(3), set[Binding]()
+    arm, rng, seen = ONE_SECTION[name], np.random.default_rng(3), set[int]()
     region = SectionRegion(arm)
-    limits = Limits(arm)
+    bend = BendLimit(arm)
     for target in rng.uniform((-0.4, -0.4, -0.2), (0.4, 0.4, 0.4), (100, 3)):
         answer = WORKSPACES[name].is_reachable(target)
         lengths = WORKSPACES[name].lengths_m(answer.nearest_m)
         slack = min((lengths - region.lower_m).min(), (region.upper_m - lengths).min())
-        travel = Binding.LENGTH | Binding.PRESSURE
+        travel = LengthLimit.bit | PressureLimit.bit
         assert bool(answer.limits & travel) == (slack < AT_BOUND_M and not answer.reachable)
-        bent = limits.bend.slack_m(lengths)[0] < AT_BOUND_M and not answer.reachable
-        assert (Binding.BEND in answer.limits) == bent
+        bent = bend.left_m(lengths)[0] < AT_BOUND_M and not answer.reachable
+        assert bool(answer.limits & BendLimit.bit) == bent
         seen.add(answer.limits)
     assert len(seen) > (name != "table1")  # its bend never binds
 

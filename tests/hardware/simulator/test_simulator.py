@@ -63,7 +63,6 @@ def session(simulated: SimulatedArm, ticks: int = 120) -> bytes:
 def test_it_is_a_device_like_any_other() -> None:
     """The Protocol's members, and the shapes and the NaN that a reading promises."""
     hardware: Hardware = connected(TRUNK)
-    assert hardware.has_watchdog
     reading = hardware.read(0.01)
     assert reading.pressures_pa.shape == (3, 3)
     assert np.isnan(reading.lengths_m).all()

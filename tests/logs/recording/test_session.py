@@ -1,6 +1,6 @@
 """Session files: names, parts, what a crash leaves, and mending it."""
 
-import contextlib
+import fcntl
 import os
 import struct
 from dataclasses import dataclass
@@ -9,23 +9,24 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.records import Metadata
+from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, Writer
 
 from pneuarm.controllers.arm.errors import LogError
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.recording.part import Part
+from pneuarm.logs.recording.repair import repair
 from pneuarm.logs.recording.session import (
     delete_oldest,
     is_finished,
     part_path,
-    parts_of,
-    repair,
     session_name,
     unfinished,
-    whole_records,
 )
-from tests.logs.recording.recording import INFO, make_session, recorded
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.logs.schema.topics import EVENT, INFO
+from tools.rig.recording import INFO as INFO_OF_ALL
+from tools.rig.recording import make_session, recorded
 
 CHUNKS = 8
 TICKS = 60  # a chunk
@@ -93,21 +94,6 @@ def test_a_file_cut_anywhere_is_readable_up_to_its_last_whole_chunk(
         assert len(texts) == chunks - 1
 
 
-@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
-def test_a_damaged_file_is_read_or_refused(
-    whole: Whole, tmp_path_factory: pytest.TempPathFactory, place: float, bit: int
-) -> None:
-    damaged = bytearray(whole.content)
-    damaged[int(place * len(damaged))] ^= 1 << bit
-    path = tmp_path_factory.mktemp("damaged") / "damaged.mcap"
-    path.write_bytes(damaged)
-    with contextlib.suppress(LogError):
-        for entry in LogReader(path):
-            assert entry.topic.message is not None
-    with contextlib.suppress(LogError):
-        assert is_finished(repair(path)[0]) or path.with_suffix(".mcap.broken").exists()
-
-
 @pytest.mark.parametrize("chunks", range(CHUNKS + 2))
 def test_a_broken_file_is_mended_with_everything_that_was_whole(
     whole: Whole, tmp_path: Path, chunks: int
@@ -116,16 +102,18 @@ def test_a_broken_file_is_mended_with_everything_that_was_whole(
     end = whole.ends[chunks] if chunks <= CHUNKS else len(whole.content)
     path.write_bytes(whole.content[: end - 1])
     assert unfinished(tmp_path) == [path]
-    mended, messages = repair(path)
+    mended = repair(path)
     if chunks == 0:
-        assert (mended.name, messages) == ("20260102T000000Z-paper.mcap.broken", 0)
-        assert list(tmp_path.iterdir()) == [mended]
-        assert mended.read_bytes() == whole.content[: end - 1]
+        kept = tmp_path / "20260102T000000Z-paper.mcap.broken"
+        assert (mended.path, mended.messages, mended.kept) == (None, 0, kept)
+        assert list(tmp_path.iterdir()) == [kept]
+        assert kept.read_bytes() == whole.content[: end - 1]
         return
-    assert mended == path
-    assert messages == sum(1 for _ in LogReader(path))
-    metadata = [record for record in whole_records(path) if isinstance(record, Metadata)]
-    assert [record.metadata for record in metadata] == [{"config_toml": INFO.config_toml}]
+    assert (mended.path, mended.kept) == (path, None)
+    assert mended.messages == sum(1 for _ in LogReader(path))
+    with path.open("rb") as file:
+        metadata = list(make_reader(file).iter_metadata())
+    assert [record.metadata for record in metadata] == [{"config_toml": INFO_OF_ALL.config_toml}]
     assert recorded(path)[0] == list(range(1, (chunks - 1) * TICKS + 1))
     assert LogReader(path).finished
     assert unfinished(tmp_path) == []
@@ -141,26 +129,95 @@ def test_mending_a_mended_file_changes_nothing(whole: Whole, tmp_path: Path) -> 
     assert [(e.topic, e.message, e.time_unix_ns) for e in LogReader(path)] == before
 
 
-@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"rubbish" * 100])
-def test_a_file_without_a_whole_record_is_set_aside(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize("content", [b"", b"\x89MC", b"\x89MCAP0\r\n"])
+def test_a_file_that_holds_nothing_is_set_aside(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "20260101T000000Z-x.mcap"
     path.write_bytes(content)
+    os.utime(path, (0, 0))  # a new one may be a recorder's that has not locked it yet
     assert unfinished(tmp_path) == [path]
-    mended, messages = repair(path)
-    assert (mended.name, messages, mended.read_bytes()) == (f"{path.name}.broken", 0, content)
+    taken = tmp_path / f"{path.name}.broken"
+    taken.write_bytes(b"of the time before")
+    mended = repair(path)
+    assert (mended.path, mended.messages) == (None, 0)
+    assert mended.kept is not None
+    assert mended.kept.read_bytes() == content
+    assert taken.read_bytes() == b"of the time before"
     assert unfinished(tmp_path) == []
 
 
-def test_mending_keeps_messages_of_others_without_schema_too(tmp_path: Path) -> None:
-    path = tmp_path / "other.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
-        channel = writer.register_channel("chatter", "json", 0)
-        writer.add_message(channel, 1, b"{}", 1)
-        writer.flush()
-    assert repair(path) == (path, 1)
+def test_what_is_not_ours_is_neither_mended_nor_deleted(tmp_path: Path, whole: Whole) -> None:
+    """Rubbish and other people's logs by a name like ours, links, pipes, folders, other names."""
+    rubbish = tmp_path / "20260101T000000Z-rubbish.mcap"
+    rubbish.write_bytes(b"rubbish" * 100)
+    cut = tmp_path / "20260101T000000Z-cut.mcap"
+    others = tmp_path / "20260101T000000Z-others.mcap"
+    for path, finish in ((cut, False), (others, True)):
+        with path.open("wb") as file:
+            writer = Writer(file)
+            writer.start()
+            writer.add_attachment(1, 1, "notes", "text/plain", b"precious")
+            channel = writer.register_channel("chatter", "json", 0)
+            writer.add_message(channel, 1, b"{}", 1)
+            writer.finish() if finish else writer.flush()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    target = elsewhere / "20260101T000000Z-paper.mcap"
+    target.write_bytes(whole.content[: whole.ends[3]])
+    (tmp_path / "20260101T000000Z-link.mcap").symlink_to(target)
+    (tmp_path / "20260101T000000Z-folder.mcap").mkdir()
+    os.mkfifo(tmp_path / "20260101T000000Z-pipe.mcap")
+    (tmp_path / "run.mcap").write_bytes(whole.content)
+    (tmp_path / "20260101T000000Z-young.mcap").touch()
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    assert unfinished(tmp_path) == []
+    assert delete_oldest(tmp_path, 1) == []
+    assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+    with pytest.raises(LogError, match="link"):
+        repair(tmp_path / "20260101T000000Z-link.mcap")
+    assert target.read_bytes() == whole.content[: whole.ends[3]]
+
+
+def test_mending_writes_through_no_link(tmp_path: Path, whole: Whole) -> None:
+    precious = tmp_path / "precious"
+    precious.write_bytes(b"of somebody")
+    path = tmp_path / "20260102T000000Z-paper.mcap"
+    path.write_bytes(whole.content[: whole.ends[3]])
+    (tmp_path / f"{path.name}.repairing").symlink_to(precious)
+    (tmp_path / "20260102T000000Z-paper.repairing").symlink_to(precious)
+    assert repair(path).path == path
+    assert precious.read_bytes() == b"of somebody"
     assert is_finished(path)
+    assert not path.is_symlink()
+
+
+@pytest.mark.parametrize("bit", range(8))
+@pytest.mark.parametrize("chunk", [0, 1, 3])
+def test_mending_loses_one_flipped_chunk_and_keeps_the_original(
+    tmp_path: Path, whole: Whole, chunk: int, bit: int
+) -> None:
+    """A log that broke off, with a bit flipped near its beginning: the rest is still there."""
+    path = tmp_path / "20260102T000000Z-paper.mcap"
+    broken = bytearray(whole.content[: whole.ends[-1]])
+    broken[whole.ends[chunk] - 40] ^= 1 << bit
+    path.write_bytes(broken)
+    ticks = recorded(path)[0]
+    assert len(ticks) >= (CHUNKS - 1) * TICKS
+    mended = repair(path)
+    assert mended.kept == tmp_path / f"{path.name}.broken"
+    assert mended.kept.read_bytes() == bytes(broken)
+    assert mended.dropped_bytes > 0
+    assert recorded(path)[0] == ticks
+    assert LogReader(path).finished
+
+
+def test_a_file_that_somebody_holds_is_not_mended(tmp_path: Path, whole: Whole) -> None:
+    path = tmp_path / "20260102T000000Z-paper.mcap"
+    path.write_bytes(whole.content[: whole.ends[3]])
+    with path.open("rb") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(LogError, match="in use"):
+            repair(path)
+    assert path.read_bytes() == whole.content[: whole.ends[3]]
 
 
 def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
@@ -172,7 +229,7 @@ def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pneuarm.logs.recording.session.os.fsync", full)
+    monkeypatch.setattr("pneuarm.logs.recording.repair.os.fsync", full)
     with pytest.raises(
         LogError, match=r"20260102T000000Z-paper\.mcap cannot be repaired: .*free some space"
     ):
@@ -183,47 +240,52 @@ def test_where_there_is_no_room_the_broken_file_stays_as_it_is(
 
 def test_a_file_that_a_recorder_holds_is_not_taken_for_broken(tmp_path: Path) -> None:
     part = Part(tmp_path / "20260102T000000Z-paper.mcap", "paper")
-    part.add_metadata("a", {})
+    part.write(EVENT, pb.Event(text="one").SerializeToString(), 1)
     part.flush()
     assert unfinished(tmp_path) == []
     os.close(part._file._fd)  # as when its process dies
     assert unfinished(tmp_path) == [tmp_path / "20260102T000000Z-paper.mcap"]
 
 
-def test_names_and_parts(tmp_path: Path) -> None:
+def test_names() -> None:
     assert session_name(1_795_350_943_000_000_000, "paper") == "20261122T123543Z-paper"
-    paths = [part_path(tmp_path, "s", part) for part in (0, 1, 2, 10)]
-    assert [path.name for path in paths] == ["s.mcap", "s.001.mcap", "s.002.mcap", "s.010.mcap"]
-    for path in (*paths, tmp_path / "s-2.mcap", tmp_path / "s.001.mcap.broken"):
-        path.write_bytes(b"")
-    assert parts_of(paths[0]) == paths
-    assert parts_of(paths[1]) == [paths[1]]
+    names = [part_path(Path(), "s", part).name for part in (0, 1, 2, 10, 1000)]
+    assert names == ["s.mcap", "s.001.mcap", "s.002.mcap", "s.010.mcap", "s.1000.mcap"]
+
+
+def write_part(path: Path, session: str, number: int) -> Path:
+    """A finished part of 100 s in which each event has its number."""
+    part = Part(path, "paper", session, number)
+    time_ns = (number + 1) * 100_000_000_000 + (10**15 if "0102" in session else 0)
+    event = pb.Event(text=f"{session} {number}")
+    part.write(INFO, INFO_OF_ALL.SerializeToString(), time_ns)
+    part.write(EVENT, event.SerializeToString(), time_ns)
+    part.finish()
+    return path
 
 
 @pytest.mark.parametrize("kept", range(6))
 def test_the_oldest_parts_go_first(tmp_path: Path, kept: int) -> None:
     old, new = "20260101T000000Z-paper", "20260102T000000Z-paper"
-    parts = (".mcap", ".001.mcap", ".002.mcap")
-    names = [*(old + part for part in parts), *(new + part for part in parts[:2])]  # oldest first
-    magic = b"\x89MCAP0\r\n"
-    for name in names:
-        (tmp_path / name).write_bytes(magic + bytes(84) + magic)
-    deleted = delete_oldest(tmp_path, kept * 100 + 50 if kept else 1)
-    assert {path.name for path in deleted} == set(names[: 5 - kept])
-    assert {path.name for path in tmp_path.iterdir()} == set(names[5 - kept :])
+    paths = [
+        write_part(part_path(tmp_path, session, number), session, number)
+        for session, numbers in ((old, (0, 999, 1000)), (new, (0, 1)))
+        for number in numbers
+    ]
+    sizes = [path.stat().st_size for path in paths]
+    deleted = delete_oldest(tmp_path, sum(sizes[5 - kept :]) or 1)
+    assert set(deleted) == set(paths[: 5 - kept])
+    assert set(tmp_path.iterdir()) == set(paths[5 - kept :])
 
 
-def test_nothing_is_deleted_that_is_unfinished_or_where_all_is_kept(tmp_path: Path) -> None:
-    (tmp_path / "20260101T000000Z-paper.mcap").write_bytes(bytes(100))
+def test_nothing_is_deleted_that_is_unfinished_or_where_all_is_kept(
+    tmp_path: Path, whole: Whole
+) -> None:
+    (tmp_path / "20260101T000000Z-paper.mcap").write_bytes(whole.content[: whole.ends[2]])
     assert delete_oldest(tmp_path, 1) == []
-    (tmp_path / "20260102T000000Z-paper.mcap").write_bytes(b"\x89MCAP0\r\n" * 2)
+    (tmp_path / "20260102T000000Z-paper.mcap").write_bytes(whole.content)
     assert delete_oldest(tmp_path, 0) == []
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_files_of_other_programs_are_left_alone(tmp_path: Path) -> None:
-    magic = b"\x89MCAP0\r\n"
-    (tmp_path / "mine.mcap").write_bytes(magic + bytes(84) + magic)
-    (tmp_path / "broken.mcap").write_bytes(magic)
-    assert delete_oldest(tmp_path, 1) == []
-    assert unfinished(tmp_path) == []
+    with (tmp_path / "20260102T000000Z-paper.mcap").open("rb") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert delete_oldest(tmp_path, 1) == []

@@ -10,7 +10,7 @@ from pneuarm.logs.rings.rings import HOLD_S, MessageReader, MessageWriter, Rings
 from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import ESTOP, EVENT, TARGET, TIP_POSE, Topic
-from tests.logs.recording.recording import CONTEXT
+from tools.rig.recording import CONTEXT
 
 
 def memory(capacity: int = 64) -> RingMemory:

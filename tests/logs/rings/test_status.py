@@ -5,7 +5,7 @@ from multiprocessing.context import SpawnProcess
 import pytest
 
 from pneuarm.logs.rings.status import Disk, RecorderStatus, ViewerStatus
-from tests.logs.recording.recording import CONTEXT
+from tools.rig.recording import CONTEXT
 
 
 def test_before_the_recorder_has_said_anything() -> None:

@@ -46,11 +46,12 @@ def test_a_tick_has_a_field_for_every_field_of_the_message(n_sections: int) -> N
         ("tip_true_position_m", lambda n: (3,)),
         ("target_position_m", lambda n: (3,)),
         ("tip_estimated_orientation_xyzw", lambda n: (4,)),
+        ("tip_offset_m", lambda n: (3,)),
         ("target_error_m", lambda n: ()),
         ("sequence", lambda n: ()),
     ],
 )
-def test_the_shape_of_a_field_follows_from_its_name(
+def test_a_field_has_the_shape_that_the_message_says(
     n_sections: int, name: str, shape_of: Callable[[int], tuple[int, ...]]
 ) -> None:
     assert new_tick(n_sections)[name].shape == shape_of(n_sections)

@@ -8,7 +8,7 @@ from google.protobuf.message import Message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pneuarm.controllers.arm.errors import TargetRejected
+from pneuarm.controllers.arm.errors import MessageRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import JSON, MAX_PAYLOAD_BYTES, PROTOBUF, decode, encode, encoding_of
 from pneuarm.logs.schema.topics import TOPICS, Topic
@@ -27,7 +27,7 @@ TARGET = pb.Target(
 
 
 def refusal(payload: bytes, encoding: str, message_type: type[Message] = pb.Target) -> str:
-    with pytest.raises(TargetRejected) as caught:
+    with pytest.raises(MessageRejected) as caught:
         decode(message_type, payload, encoding)
     text = str(caught.value)
     assert "\n" not in text
@@ -73,7 +73,7 @@ def read(payload: bytes, encoding: str, message_type: type[Message] = pb.Target)
     """The message, or why there is none; any other exception fails the test."""
     try:
         return decode(message_type, payload, encoding)
-    except TargetRejected as error:
+    except MessageRejected as error:
         return str(error)
 
 

@@ -12,7 +12,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.cli.client_commands import target_of
 from pneuarm.service.cli.parser import build_parser, main
 from pneuarm.service.configuration.configuration import load
-from tests.logs.recording.recording import make_session
+from tools.rig.recording import make_session
 
 CONNECTION = ["--arm", "trunk", "--connect", "tcp/127.0.0.1:9", "--zenoh-config", "z", "--json"]
 POSE = ["1", "2", "3", "0", "0", "0", "1"]

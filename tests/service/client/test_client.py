@@ -12,7 +12,10 @@ import pytest
 from pneuarm import Client
 from pneuarm.controllers.arm.errors import (
     DaemonUnreachable,
+    LeaseRefused,
+    MessageRejected,
     ModeRefused,
+    MoveTimeout,
     NotConfirmed,
     TargetRejected,
 )
@@ -132,9 +135,9 @@ def test_move_without_arming_is_refused(client: Client) -> None:
     assert client.state().mode == pb.READY
 
 
-def test_move_that_takes_too_long_is_not_confirmed(client: Client) -> None:
+def test_move_that_takes_too_long_is_told_as_that(client: Client) -> None:
     client.enable()
-    with pytest.raises(NotConfirmed, match=r"not reached within 0\.05 s"):
+    with pytest.raises(MoveTimeout, match=r"0\.05 s"):
         client.move_to((0.05, 0.0, 0.2), timeout_s=0.05)
 
 
@@ -143,8 +146,21 @@ def test_refused_mode_is_raised(client: Client) -> None:
         client.hold()
     with pytest.raises(ModeRefused, match="mode is ready"):
         client.reset()
-    with pytest.raises(ModeRefused, match="does not hold the lease"):
+    with pytest.raises(LeaseRefused):
         client.release()
+
+
+def test_refusal_says_whether_it_is_the_mode_or_the_lease(client: Client, daemon: Daemon) -> None:
+    client.enable()
+    with daemon.client("other") as other:
+        with pytest.raises(ModeRefused) as refused:
+            other.reset()  # nothing to reset, whoever holds the lease
+        assert not isinstance(refused.value, LeaseRefused)
+        with pytest.raises(LeaseRefused, match=client.client_id):
+            other.enable()
+        other.client_id = "x" * 65
+        with pytest.raises(MessageRejected, match="client_id"):
+            other.enable()
 
 
 def test_stop_is_confirmed_latched_and_left_by_reset(client: Client, daemon: Daemon) -> None:

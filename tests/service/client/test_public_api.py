@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import pneuarm
+from pneuarm.controllers.arm import errors
 from tools.rig.daemon import ROOT
 
 HEAVY = ("casadi", "osqp", "rerun", "mcap", "pydantic", "scipy")
@@ -53,7 +54,15 @@ def test_folder_called_logs_changes_nothing(tmp_path: Path) -> None:
 def test_every_public_name_is_there() -> None:
     for name in pneuarm.__all__:
         assert getattr(pneuarm, name) is not None
-    errors = [getattr(pneuarm, name) for name in pneuarm.__all__ if name != "Client"]
-    assert all(issubclass(error, pneuarm.PneuarmError) for error in errors)
-    assert issubclass(pneuarm.LeaseRefused, pneuarm.ModeRefused)
-    assert issubclass(pneuarm.NotConfirmed, pneuarm.DaemonUnreachable)
+
+
+def test_every_exception_of_the_tree_is_public() -> None:
+    tree = {name for name, value in vars(errors).items() if isinstance(value, type)}
+    assert tree == set(pneuarm.__all__) - {"Client", "__version__"}
+    assert all(issubclass(getattr(pneuarm, name), pneuarm.PneuarmError) for name in tree)
+
+
+def test_what_is_no_failure_of_the_connection_is_not_told_as_one() -> None:
+    for error in (pneuarm.MoveTimeout, pneuarm.NotConfirmed, pneuarm.MessageRejected):
+        assert not issubclass(error, pneuarm.DaemonUnreachable)
+    assert not issubclass(pneuarm.MoveTimeout, pneuarm.NotConfirmed)  # of a stop alone

@@ -2,7 +2,9 @@
 
 import contextlib
 import os
+import re
 import tomllib
+from errno import EISDIR, ENOENT
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import HalfSpace, Sphere
 from pneuarm.controllers.arm.errors import ConfigurationError
-from pneuarm.controllers.laws.controller import Controller
+from pneuarm.controllers.controller import Controller
 from pneuarm.service.cli.parser import PRESETS as CLI_PRESETS
 from pneuarm.service.configuration.configuration import (
     PRESETS,
@@ -24,6 +26,7 @@ from pneuarm.service.configuration.configuration import (
     log_directory,
     rerun_url,
 )
+from pneuarm.service.devices import registry
 
 SECTION = load().model_dump()["arm"]["sections"][0]
 
@@ -103,59 +106,72 @@ def test_an_unknown_key_is_refused_with_those_there_are(
     tmp_path: Path, text: str, key: str, beside: str
 ) -> None:
     (line,) = refusals(tmp_path, text)
-    assert line.startswith(f"{key}: no such key; allowed here: ")
-    assert beside in line.partition("allowed here: ")[2].split(", ")
+    assert line.split(":")[0] == key
+    assert beside in re.findall(r"\w+", line)
 
 
 def test_an_unknown_key_of_a_section_too(tmp_path: Path) -> None:
     tables = {"arm": {"sections": [SECTION, SECTION | {"colour": "red"}]}}
     (line,) = refusals(tmp_path, tomli_w.dumps(tables))
-    assert line.startswith("arm.sections[1].colour: no such key; allowed here: rest_length_mm, ")
+    assert line.split(":")[0] == "arm.sections[1].colour"
+    assert set(SECTION) <= set(re.findall(r"\w+", line))
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("[control]\nrate_hz = 10", "control.rate_hz = 10: input should be greater than"),
-        ("[control]\nrate_hz = nan", "control.rate_hz = nan: input should be"),
-        ("[control]\nrate_hz = 'fast'", "control.rate_hz = 'fast': input should be a valid number"),
-        ("[control]\ntip_speed_max_mm_s = inf", "control.tip_speed_max_mm_s = inf: input should"),
-        ("[control]\nlaw = 'pid'", "control.law = 'pid': input should be 'resolved_rate' or"),
-        ("[control]\nrate_hz = '500'", "control.rate_hz = '500': input should be a valid number"),
-        ("[rerun]\nenabled = 1", "rerun.enabled = 1: input should be a valid boolean"),
-        ("[zenoh]\nlisten = ['localhost']", "zenoh.listen[0] = 'localhost': string should match"),
-        ("control = 3", "control = 3: input should be"),
-        ("[hardware]\nadapter = 'festo'", "hardware.adapter = 'festo': input should be 'sim"),
-        ("[log]\nroll_mib = inf", "log.roll_mib = inf: input should be a finite number"),
-        ("[log]\nkeep_gib = nan", "log.keep_gib = nan: input should be"),
-        ("[rerun]\nport = 70000", "rerun.port = 70000: input should be less than or equal to"),
-        ("[rerun]\nport = 1.5", "rerun.port = 1.5: input should be a valid integer"),
-        ("[simulator]\nseed = -1", "simulator.seed = -1: input should be greater than"),
-        ("[zenoh]\nlisten = []", "zenoh.listen = []: tuple should have at least 1 item"),
-        ("[arm]\nname = 'My Arm'", "arm.name = 'My Arm': string should match"),
-        ("[arm]\ngravity_m_s2 = [0, 0]", "arm.gravity_m_s2[2] is missing"),
-        ("preset = 'octopus'", "preset = 'octopus'; allowed: paper, table1, trunk"),
-        ("preset = 3", "preset = 3; allowed: paper, table1, trunk"),
-        ("a = ", "is not TOML: Invalid value"),
-        ("a = " + "[" * 5000, "is not TOML: "),
-    ],
-)
+#: A file, the key that the refusal begins with, and what it tells: the value, and what is allowed.
+WRONG = [
+    ("[control]\nrate_hz = 10", "control.rate_hz", ("10", "50")),
+    ("[control]\nrate_hz = nan", "control.rate_hz", ("nan",)),
+    ("[control]\nrate_hz = 'fast'", "control.rate_hz", ("'fast'", "number")),
+    ("[control]\ntip_speed_max_mm_s = inf", "control.tip_speed_max_mm_s", ("inf", "finite")),
+    ("[control]\nlaw = 'pid'", "control.law", ("'pid'", "'resolved_rate'", "'qp_ik'")),
+    ("[control]\nrate_hz = '500'", "control.rate_hz", ("'500'", "number")),
+    ("[rerun]\nenabled = 1", "rerun.enabled", ("1", "boolean")),
+    ("[zenoh]\nlisten = ['localhost']", "zenoh.listen[0]", ("'localhost'", "tcp")),
+    ("control = 3", "control", ("3",)),
+    ("[hardware]\nadapter = 'festo'", "hardware.adapter", ("'festo'", "simulator", "festo-cpx")),
+    ("[log]\nroll_mib = inf", "log.roll_mib", ("inf", "finite")),
+    ("[log]\nkeep_gib = nan", "log.keep_gib", ("nan",)),
+    ("[rerun]\nport = 70000", "rerun.port", ("70000", "65535")),
+    ("[rerun]\nport = 1.5", "rerun.port", ("1.5", "integer")),
+    ("[simulator]\nseed = -1", "simulator.seed", ("-1", "0")),
+    ("[zenoh]\nlisten = []", "zenoh.listen", ("[]", "at least 1")),
+    ("[arm]\nname = 'My Arm'", "arm.name", ("'My Arm'", "a-z")),
+    ("[arm]\ngravity_m_s2 = [0, 0]", "arm.gravity_m_s2[2]", ("missing",)),
+    ("preset = 'octopus'", "preset", ("'octopus'", *PRESETS)),
+    ("preset = 3", "preset", ("3", *PRESETS)),
+]
+
+
+@pytest.mark.parametrize(("text", "key", "told"), WRONG)
 def test_a_wrong_value_is_refused_with_key_value_and_what_is_allowed(
-    tmp_path: Path, text: str, sentence: str
+    tmp_path: Path, text: str, key: str, told: tuple[str, ...]
 ) -> None:
     (line,) = refusals(tmp_path, text)
-    assert line.startswith(sentence)
+    assert re.split(r" = |: | is ", line)[0] == key
+    assert all(fact in line.removeprefix(key) for fact in told)
+
+
+@pytest.mark.parametrize("text", ["a = ", "a = " + "[" * 5000])
+def test_what_is_no_toml_is_refused(tmp_path: Path, text: str) -> None:
+    (line,) = refusals(tmp_path, text)
+    assert "TOML" in line
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"length_min_mm": 250.0}, ("length_min_mm = 250", "must increase in this order")),
-        ({"length_max_mm": 150.0}, ("length_max_mm = 150", "must increase in this order")),
-        ({"pressure_min_bar": 0.1}, ("pressure_min_bar = 0.1", "less than or equal to 0")),
-        ({"pressure_max_bar": -0.1}, ("pressure_max_bar = -0.1", "greater than 0")),
+        (
+            {"length_min_mm": 250.0},
+            ("length_min_mm = 250", "rest_length_mm = 200"),
+        ),
+        (
+            {"length_max_mm": 150.0},
+            ("length_max_mm = 150", "rest_length_mm = 200"),
+        ),
+        ({"pressure_min_bar": 0.1}, ("pressure_min_bar = 0.1", "equal to 0")),
+        ({"pressure_max_bar": -0.1}, ("pressure_max_bar = -0.1", "than 0")),
         ({"rest_length_mm": float("nan")}, ("rest_length_mm = nan",)),
-        ({"bend_max_deg": 0}, ("bend_max_deg = 0", "greater than 0")),
+        ({"bend_max_deg": 0}, ("bend_max_deg = 0", "than 0")),
     ],
 )
 def test_bounds_that_contradict_each_other_are_refused(
@@ -173,13 +189,14 @@ def test_every_mistake_is_said_at_once(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"none\.toml cannot be read: No such file"):
-        load(tmp_path / "none.toml")
-    with pytest.raises(ConfigurationError, match="cannot be read: Is a directory"):
-        load(tmp_path)
     (tmp_path / "binary.toml").write_bytes(os.urandom(8) + b"\xff\xfe")
-    with pytest.raises(ConfigurationError, match=r"binary\.toml is not TOML"):
+    for name, why in (("none.toml", os.strerror(ENOENT)), ("", os.strerror(EISDIR))):
+        with pytest.raises(ConfigurationError, match=why) as refused:
+            load(tmp_path / name)
+        assert str(tmp_path / name) in str(refused.value)
+    with pytest.raises(ConfigurationError, match="TOML") as refused:
         load(tmp_path / "binary.toml")
+    assert "binary.toml" in str(refused.value)
 
 
 NAMES = st.sampled_from(
@@ -216,9 +233,9 @@ def test_a_configuration_is_never_changed() -> None:
 
 def test_addresses(tmp_path: Path) -> None:
     one = load()
-    assert one.device_address == "simulator:paper"
+    assert registry.address(one) == "simulator:paper"
     two = loaded(tmp_path, "[hardware]\ndevice = 'bench'\n[rerun]\nbind = '0.0.0.0'\nport = 99\n")
-    assert two.device_address == "simulator:bench"
+    assert registry.address(two) == "simulator:bench"
     assert rerun_url(one) == "rerun+http://127.0.0.1:9876/proxy"
     assert rerun_url(two) == "rerun+http://127.0.0.1:99/proxy"
     assert log_directory(loaded(tmp_path, "[log]\ndirectory = '~/x'")) == Path.home() / "x"
@@ -245,8 +262,8 @@ def test_a_calibrated_section_and_response_become_si(tmp_path: Path) -> None:
 def test_a_coupling_without_an_inverse_is_refused(tmp_path: Path) -> None:
     flat = SECTION | {"coupling": [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]}
     (line,) = refusals(tmp_path, tomli_w.dumps({"arm": {"sections": [flat]}}))
-    assert line.startswith("arm: coupling = [[1.0, 0.0, 0.0], [1.0")
-    assert "rows must be independent" in line
+    assert "coupling = [[1.0, 0.0, 0.0], [1.0" in line
+    assert "independent" in line
 
 
 def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path) -> None:
@@ -258,7 +275,7 @@ def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path) ->
     assert loaded(tmp_path, own.to_toml()) == own
     two = real | {"sections": [SECTION, SECTION]}
     (line,) = refusals(tmp_path, tomli_w.dumps({"simulator": {"arm": two}}))
-    assert "simulator.arm has 2 sections, arm has 1" in line
+    assert re.search(r"simulator\.arm .*2 sections.* arm .*1", line)
 
 
 WALL = {"shape": "half_space", "normal": [0.0, 0.0, 2.0], "offset_mm": 320.0}
@@ -283,14 +300,14 @@ def test_keep_outs_become_the_arms_in_metres() -> None:
 @pytest.mark.parametrize(
     ("place", "said"),
     [
-        (WALL | {"radius_mm": 3.0}, "a half_space has the keys normal and offset_mm"),
-        ({"shape": "sphere", "radius_mm": 3.0}, "a sphere has the keys center_mm and radius_mm"),
-        (WALL | {"normal": [0.0, 0.0, 0.0]}, "points nowhere"),
-        (WALL | {"shape": "cube"}, "arm.keep_outs"),
-        (WALL | {"offset_mm": 190.0}, "keep_outs[0] contains a part of section 1"),
+        (WALL | {"radius_mm": 3.0}, ("half_space", "normal", "offset_mm")),
+        ({"shape": "sphere", "radius_mm": 3.0}, ("sphere", "center_mm", "radius_mm")),
+        (WALL | {"normal": [0.0, 0.0, 0.0]}, ("keep_outs[0]", "normal = [0, 0, 0]")),
+        (WALL | {"shape": "cube"}, ("arm.keep_outs[0].shape", "'cube'", "sphere", "half_space")),
+        (WALL | {"offset_mm": 190.0}, ("keep_outs[0]", "section 1")),
     ],
 )
-def test_a_wrong_keep_out_is_refused(place: dict[str, object], said: str) -> None:
+def test_a_wrong_keep_out_is_refused(place: dict[str, object], said: tuple[str, ...]) -> None:
     with pytest.raises(ConfigurationError) as refused:
         check(with_keep_outs(place))
-    assert said in str(refused.value)
+    assert all(fact in str(refused.value) for fact in said)

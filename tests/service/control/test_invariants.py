@@ -31,7 +31,7 @@ def test_1_no_pressure_outside_limits_or_slew_reaches_the_device(preset: str) ->
 )
 def test_1_whatever_happens_upstream(rubbish: Array, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench().activate()
-    monkeypatch.setattr(bench.loop._controller, "pressures_pa", lambda: rubbish)
+    monkeypatch.setattr(bench.loop._steering._controller, "pressures_pa", lambda: rubbish)
     bench.run(0.5, FAR)
     assert bench.newest["guard_interventions"] > 100
     assert_writes_within_limits_and_slew(bench)
@@ -143,7 +143,11 @@ def test_6_the_stop_acts_in_the_tick_it_arrives_in(others: list[ModeEvent]) -> N
         bench.ask(event)
     vents, writes = len(bench.hardware.vents), len(bench.hardware.writes)
     reply = bench.ask(ModeEvent.ESTOP, "anybody")
-    assert (reply.accepted, reply.mode, reply.sequence) == (True, Mode.ESTOP, bench.loop.sequence)
+    assert (reply.accepted, reply.mode, reply.sequence) == (
+        True,
+        Mode.ESTOP,
+        bench.newest["sequence"],
+    )
     assert (bench.mode, bench.newest["mode"]) == (Mode.ESTOP, Mode.ESTOP)
     assert len(bench.hardware.vents) == vents + 1
     assert len(bench.hardware.writes) == writes

@@ -3,18 +3,21 @@
 import numpy as np
 import pytest
 
-from pneuarm.controllers.laws.controller import Binding, Reach
+from pneuarm.controllers.limits.length import LengthLimit
+from pneuarm.controllers.limits.pressure import PressureLimit
+from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import (
     LawName,
     LengthsTarget,
     PositionTarget,
     PressuresTarget,
     Target,
-    TargetKind,
     TwistTarget,
 )
 from pneuarm.hardware.guard import Intervention
 from pneuarm.logs.rings.status import Disk
+from pneuarm.logs.rings.tick import tick_dtype
+from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.control.loop import Timing
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import Heartbeat, RequestMode, SetTipPose
@@ -46,33 +49,33 @@ def test_a_position_within_reach_is_reached(law: LawName) -> None:
 @pytest.mark.parametrize(
     ("preset", "position", "binding"),
     [
-        ("paper", (0.0, 0.0, 0.5), Binding.LENGTH),
-        ("paper", (0.0, 0.0, 0.02), Binding.LENGTH),
-        ("table1", (0.0, 0.0, 0.4), Binding.PRESSURE),
-        ("table1", (0.0, 0.0, 0.1), Binding.PRESSURE),
+        ("paper", (0.0, 0.0, 0.5), LengthLimit.bit),
+        ("paper", (0.0, 0.0, 0.02), LengthLimit.bit),
+        ("table1", (0.0, 0.0, 0.4), PressureLimit.bit),
+        ("table1", (0.0, 0.0, 0.1), PressureLimit.bit),
     ],
 )
 def test_out_of_reach_is_said_with_the_limit_that_binds(
-    preset: str, position: tuple[float, ...], binding: Binding
+    preset: str, position: tuple[float, ...], binding: int
 ) -> None:
     bench = Bench(preset).activate()
     bench.run(3.0, PositionTarget(np.array(position)))
     assert bench.mode == Mode.ACTIVE
     assert bench.newest["reach"] == Reach.OUT_OF_REACH
-    assert Binding(int(bench.newest["binding_limits"])) & binding
+    assert int(bench.newest["binding_limits"]) & binding
     assert bench.newest["target_error_m"] > 5e-4
 
 
 @pytest.mark.parametrize(
     ("target", "kind"),
     [
-        (NEAR, TargetKind.POSITION),
-        (LengthsTarget(np.array([[0.21, 0.2, 0.19]])), TargetKind.LENGTHS),
-        (PressuresTarget(np.array([[1e4, 0.0, -1e4]])), TargetKind.PRESSURES),
-        (TwistTarget(np.array([0.01, 0, 0]), None, False, False), TargetKind.TWIST),
+        (NEAR, PositionTarget.kind),
+        (LengthsTarget(np.array([[0.21, 0.2, 0.19]])), LengthsTarget.kind),
+        (PressuresTarget(np.array([[1e4, 0.0, -1e4]])), PressuresTarget.kind),
+        (TwistTarget(np.array([0.01, 0, 0]), None, False, False), TwistTarget.kind),
     ],
 )
-def test_the_record_tells_the_target_it_follows(target: Target, kind: TargetKind) -> None:
+def test_the_record_tells_the_target_it_follows(target: Target, kind: int) -> None:
     bench = Bench().activate()
     command = bench.target(target, age_s=0.05)
     tick = bench.tick(command)
@@ -82,7 +85,7 @@ def test_the_record_tells_the_target_it_follows(target: Target, kind: TargetKind
     assert np.isfinite(tick["target_position_m"]).all() == known
     assert bench.tick()["target_age_s"] == pytest.approx(0.052)
     bench.ask(ModeEvent.HOLD)
-    assert bench.newest["target_kind"] == TargetKind.NONE
+    assert bench.newest["target_kind"] == pb.NO_TARGET
     assert np.isnan(bench.newest["target_position_m"]).all()
 
 
@@ -95,7 +98,7 @@ def test_targets_that_come_before_active_are_dropped(order: str) -> None:
     else:  # in the same tick, ahead of the request
         bench.tick(bench.target(NEAR), RequestMode(ModeEvent.ENABLE, 2, "me"))
     assert bench.mode == Mode.ACTIVE
-    assert bench.run(0.5)["target_kind"] == TargetKind.NONE
+    assert bench.run(0.5)["target_kind"] == pb.NO_TARGET
     assert not bench.newest["pressure_sent_pa"].any() or (
         np.abs(bench.newest["pressure_sent_pa"]).max() < 2000.0
     )
@@ -134,7 +137,9 @@ def test_one_tick_of_rubbish_leaves_nothing_behind(
     bench.run(1.5, NEAR)
     before = bench.newest["pressure_sent_pa"].copy()
     with monkeypatch.context() as patch:
-        patch.setattr(bench.loop._controller, "pressures_pa", lambda: np.full((1, 3), rubbish))
+        patch.setattr(
+            bench.loop._steering._controller, "pressures_pa", lambda: np.full((1, 3), rubbish)
+        )
         bench.tick()
     assert bench.newest["guard_intervention"]
     bench.ask(ModeEvent.HOLD)
@@ -253,8 +258,9 @@ def test_events_and_ticks_have_the_time_of_the_session() -> None:
 def test_the_clocks_figures_are_written_down() -> None:
     bench = Bench()
     bench.now_ns += bench.period_ns
-    bench.loop.tick(bench.now_ns, [Heartbeat(False)], Disk.OK, Timing(1e-5, 2e-4, 7))
-    tick = bench.loop._tick
+    timing = Timing(1e-5, 2e-4, 7)
+    record, _ = bench.loop.tick(bench.now_ns, [Heartbeat(False)], Disk.OK, timing)
+    tick = np.frombuffer(record, tick_dtype(1))[0]
     assert (tick["wake_latency_s"], tick["compute_s"], tick["overruns"]) == (1e-5, 2e-4, 7)
 
 
@@ -268,7 +274,9 @@ def test_a_measured_tip_is_written_down_with_its_age() -> None:
 
 def test_the_guards_work_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench().activate()
-    monkeypatch.setattr(bench.loop._controller, "pressures_pa", lambda: np.full((1, 3), 1e6))
+    monkeypatch.setattr(
+        bench.loop._steering._controller, "pressures_pa", lambda: np.full((1, 3), 1e6)
+    )
     bench.run(0.01)
     assert Intervention(int(bench.newest["guard_intervention"])) & Intervention.RANGE
     assert bench.newest["guard_interventions"] == 5

@@ -5,26 +5,25 @@ import pytest
 
 from pneuarm.controllers.feedback.estimator import EstimateSource
 from pneuarm.controllers.reach.reach import Reach
-from pneuarm.controllers.targets.shapes import Circle
-from pneuarm.controllers.targets.targets import LengthsTarget, PressuresTarget
+from pneuarm.controllers.targets.targets import CircleTarget, LengthsTarget, PressuresTarget
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import RequestMode
 from tests.service.control.test_loop_calibrated import calibrated_configuration
-from tools.bench.rig import Rig
+from tools.bench.rig import CameraRig
 from tools.rig.simulated import configuration_of
 
 HOME = np.array([0.0, 0.0, 0.2])
-CIRCLE = Circle((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
+CIRCLE = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.03, 0.25)
 
 
 @pytest.fixture(scope="module")
-def rig() -> Rig:
-    rig = Rig(configuration_of(seed=1)).activate()
+def rig() -> CameraRig:
+    rig = CameraRig(configuration_of(seed=1)).activate()
     rig.to(HOME, 4.0)
     return rig
 
 
-def test_the_measured_tip_takes_the_arm_to_its_target(rig: Rig) -> None:
+def test_the_measured_tip_takes_the_arm_to_its_target(rig: CameraRig) -> None:
     ticks = rig.to(np.array([0.02, 0.0, 0.2]), 6.0)
     last = ticks[-1]
     assert np.linalg.norm(last["tip_true_position_m"] - [0.02, 0.0, 0.2]) < 2e-3
@@ -40,13 +39,13 @@ def test_the_measured_tip_takes_the_arm_to_its_target(rig: Rig) -> None:
 def test_a_target_is_reached_although_the_correction_never_rests() -> None:
     calibrated = calibrated_configuration()
     control = calibrated.control.model_copy(update={"rate_hz": 1000.0})
-    rig = Rig(calibrated.model_copy(update={"control": control})).activate()
+    rig = CameraRig(calibrated.model_copy(update={"control": control})).activate()
     ticks = rig.to(np.array([0.04, 0.0, 0.2]), 5.0)
     assert ticks["reach"][-1] == Reach.REACHED
     assert np.ptp(ticks["tip_offset_m"][-500:], axis=0).max() > 0.0
 
 
-def test_loss_and_return_on_a_circle_are_told_and_jump_no_command(rig: Rig) -> None:
+def test_loss_and_return_on_a_circle_are_told_and_jump_no_command(rig: CameraRig) -> None:
     def largest(ticks: np.ndarray) -> float:
         changes = np.diff(ticks["tip_commanded_position_m"], axis=0)
         return float(np.linalg.norm(changes, axis=1).max())
@@ -68,7 +67,7 @@ def test_loss_and_return_on_a_circle_are_told_and_jump_no_command(rig: Rig) -> N
     assert [event.code for event in rig.events] == ["camera_lost", "camera_seen"]
 
 
-def test_a_jump_is_told_once_and_moves_nothing(rig: Rig) -> None:
+def test_a_jump_is_told_once_and_moves_nothing(rig: CameraRig) -> None:
     rig.to(HOME, 4.0)
     rig.events.clear()
     before = rig.ticks()[-1]["tip_offset_m"]
@@ -81,7 +80,7 @@ def test_a_jump_is_told_once_and_moves_nothing(rig: Rig) -> None:
     assert [event.code for event in rig.events] == ["tip_pose_refused"]
 
 
-def test_targets_without_a_reference_pass_it_by(rig: Rig) -> None:
+def test_targets_without_a_reference_pass_it_by(rig: CameraRig) -> None:
     lengths = rig.arm.rest_lengths_m + np.array([[0.01, 0.0, 0.0]])
     ticks = rig.run(1.0, LengthsTarget(lengths))
     assert np.isnan(ticks["reference_position_m"][-1]).all()
@@ -92,7 +91,7 @@ def test_targets_without_a_reference_pass_it_by(rig: Rig) -> None:
 
 
 def test_arming_again_after_feedback_does_not_move_the_tip() -> None:
-    rig = Rig(calibrated_configuration()).activate()
+    rig = CameraRig(calibrated_configuration()).activate()
     rig.to(np.array([0.03, 0.01, 0.2]), 3.0)
     rig.rest(RequestMode(ModeEvent.HOLD, 2, "bench"), 0.6)
     held = rig.ticks()[-1]
@@ -105,7 +104,7 @@ def test_arming_again_after_feedback_does_not_move_the_tip() -> None:
     assert moved.max() < 1e-3
 
 
-def test_pressures_are_sent_without_lead_or_dither(rig: Rig) -> None:
+def test_pressures_are_sent_without_lead_or_dither(rig: CameraRig) -> None:
     rig.run(1.0, PressuresTarget(np.zeros((1, 3))))
     wanted_pa = np.array([[2e4, 1e4, 0.0]])
     sent_pa = rig.run(1.0, PressuresTarget(wanted_pa))["pressure_sent_pa"]

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneuarm.logs.reading.reader import LogReader, summarise
+from pneuarm.logs.reading.reader import LogReader
+from pneuarm.logs.reading.summary import summarise
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.control.loop import NEAR_ZERO_PA
 from tools.rig.daemon import Daemon, enough, keep_moving, wait_for

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pneuarm.logs.reading.reader import summarise
+from pneuarm.logs.reading.summary import summarise
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from tools.rig.daemon import Daemon, arm, enough, keep_moving, wait_for
 

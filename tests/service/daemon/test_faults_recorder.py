@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pneuarm.controllers.arm.errors import LogError, ModeRefused
-from pneuarm.logs.reading.reader import LogSummary, summarise
+from pneuarm.logs.reading.summary import LogSummary, summarise
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.client import Client
 from pneuarm.service.daemon import recorder as recording

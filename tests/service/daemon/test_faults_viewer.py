@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from pneuarm.logs.reading.reader import summarise
+from pneuarm.logs.reading.summary import summarise
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.client import Client
 from tools.rig.daemon import Daemon, arm, enough, health_of, keep_moving

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pneuarm.logs.reading.reader import LogReader, summarise
+from pneuarm.logs.reading.reader import LogReader
+from pneuarm.logs.reading.summary import summarise
 from pneuarm.service.demo.figures import Figures, table
 from tools.rig.daemon import run_command
 

@@ -3,14 +3,17 @@
 import pytest
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
+from pneuarm.hardware.esp32.device import DEVICE as ESP32
+from pneuarm.hardware.tables.table import BAR
 from pneuarm.service.configuration.configuration import PRESETS, load
-from pneuarm.service.configuration.tables.table import BAR
-from pneuarm.service.demo.device import emulated, fitting
+from pneuarm.service.configuration.devices import AnyDevice, devices
+from pneuarm.service.demo.device import emulated
+from pneuarm.service.devices.registry import fitting
 
 
 @pytest.mark.parametrize("arm", PRESETS)
 def test_the_arm_behind_an_esp32_needs_no_more_than_its_pump_gives(arm: str) -> None:
-    found, builtin = fitting("esp32", arm), load(preset=arm)
+    found, builtin = fitting(ESP32, arm), load(preset=arm)
     built = found.build_arm()
     assert built.per_chamber("pressure_min_pa").min() >= 0.0
     assert built.per_chamber("pressure_max_pa").max() < found.esp32.ceiling_bar * BAR
@@ -19,9 +22,11 @@ def test_the_arm_behind_an_esp32_needs_no_more_than_its_pump_gives(arm: str) -> 
     assert built.rest_lengths_m.tolist() == builtin.build_arm().rest_lengths_m.tolist()
 
 
-@pytest.mark.parametrize("adapter", ["festo-cpx", "festo-vtem", "ctrl-p"])
-def test_every_other_device_moves_the_built_in_arm(adapter: str) -> None:
-    assert fitting(adapter, "paper") == load(preset="paper")
+@pytest.mark.parametrize("device", devices().usable.values(), ids=lambda device: device.name)
+def test_every_device_has_an_arm_that_it_can_move(device: AnyDevice) -> None:
+    """The built-in one, where it needs no other."""
+    fits = fitting(device, "paper")
+    assert (fits == load(preset="paper")) == (not device.demo_section)
 
 
 def test_the_simulator_needs_nothing_beside_it() -> None:
@@ -31,5 +36,5 @@ def test_the_simulator_needs_nothing_beside_it() -> None:
 
 def test_the_daemon_is_told_of_the_arm_that_its_device_moves() -> None:
     with emulated("esp32", "paper", 0) as tables:
-        assert tables["arm"] == fitting("esp32", "paper").arm.model_dump(exclude_none=True)
+        assert tables["arm"] == fitting(ESP32, "paper").arm.model_dump(exclude_none=True)
         assert tables["hardware"] == {"adapter": "esp32", "accept_no_watchdog": True}

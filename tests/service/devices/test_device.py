@@ -15,10 +15,11 @@ from pneuarm.hardware.emulation.emulation import EmulatedArm
 from pneuarm.hardware.festo_cpx.emulator import EmulatedCpx
 from pneuarm.hardware.festo_cpx.protocol import CpxLayout
 from pneuarm.hardware.guard import Guard
+from pneuarm.hardware.transports.modbus_server import ServedTerminal
 from pneuarm.service.configuration.configuration import Configuration, check, load
 from pneuarm.service.devices.process import WARM_UP_COMMANDS, DeviceProcess
 from pneuarm.service.processes.device_slots import DeviceLink, DeviceWatch, LinkedDevice, LinkState
-from tests.hardware.festo_bench import WATCHDOG, Served
+from tests.hardware.festo_bench import WATCHDOG
 
 SOME_PA = np.array([[2e4, -1e4, 1e4]])
 ZEROS = np.zeros((1, 3))
@@ -48,7 +49,7 @@ class Terminal(EmulatedCpx):
 class Rig:
     """Control's end, the process (its steps called here) and the terminal behind it."""
 
-    def __init__(self, served: Served, terminal: Terminal, arm: EmulatedArm) -> None:
+    def __init__(self, served: ServedTerminal, terminal: Terminal, arm: EmulatedArm) -> None:
         self.served, self.terminal, self.arm = served, terminal, arm
         self.link = DeviceLink.create(multiprocessing.get_context("spawn"), 1)
         self.control = LinkedDevice(self.link)
@@ -95,7 +96,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
     monkeypatch.setattr(Guard, "MAX_AGE_S", MAX_AGE_S)
     arm = EmulatedArm(load(None, "paper").build_arm(), 0)
     terminal = Terminal(arm)
-    with Served(terminal) as served:
+    with ServedTerminal(terminal) as served:
         rig = Rig(served, terminal, arm)
         yield rig
         rig.process._let_go()

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from pneuarm.hardware.device import Bus
 from pneuarm.service.configuration.configuration import Configuration, load
 from pneuarm.service.control.clock import Wake
 from pneuarm.service.daemon.local_stop import lock
-from pneuarm.service.devices.access import serial_paths, tcp_address
+from pneuarm.service.devices import registry
 from pneuarm.service.doctor import device, machine, places, rights, timing
 from pneuarm.service.doctor.command import examine
 from pneuarm.service.doctor.finding import Finding, Verdict, summary
+from pneuarm.service.systemd.unit import unit_text
 from tools.rig.daemon import ROOT, Daemon, free_port, run_command
 
 
@@ -134,20 +136,25 @@ def test_a_device_on_the_network_is_reached_or_not() -> None:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
         port = listener.getsockname()[1]
-        there = configured(hardware={"adapter": "other", "device": f"127.0.0.1:{port}"})
+        terminal = {"host": "127.0.0.1", "port": port}
+        there = configured(hardware={"adapter": "festo-cpx"}, festo_cpx=terminal)
         assert device.reachable(there).verdict is Verdict.OK
     gone = device.reachable(there)
     assert gone.verdict is Verdict.FAILED
-    assert f"127.0.0.1 port {port} cannot be reached" in gone.text
+    for fact in ("127.0.0.1", str(port)):
+        assert fact in gone.text
     assert gone.remedy.startswith("ping ")
+
+
+def on_port(path: str) -> Configuration:
+    return configured(hardware={"adapter": "ctrl-p"}, ctrl_p={"device": path})
 
 
 def test_a_device_file_is_there_and_may_be_opened_or_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     master, slave = os.openpty()
-    path = os.ttyname(slave)
-    there = configured(hardware={"adapter": "ctrl_p", "device": path})
+    there = on_port(os.ttyname(slave))
     assert device.reachable(there).verdict is Verdict.OK
     monkeypatch.setattr(device.os, "access", lambda path, mode: False)
     refused = device.reachable(there)
@@ -155,26 +162,26 @@ def test_a_device_file_is_there_and_may_be_opened_or_not(
     assert "usermod -aG" in refused.remedy
     os.close(master)
     os.close(slave)
-    missing = device.reachable(configured(hardware={"adapter": "ctrl_p", "device": "/dev/none"}))
+    missing = device.reachable(on_port("/dev/none"))
     assert missing.verdict is Verdict.FAILED
-    assert "plugged in" in missing.text
+    assert "/dev/none" in missing.text
 
 
-def test_addresses_are_found_in_the_tables_of_an_adapter() -> None:
-    assert serial_paths(load()) == []
-    assert tcp_address(load()) is None
-    terminal = {"host": "10.0.0.2", "port": 1502}
-    cpx = configured(hardware={"adapter": "festo-cpx"}, festo_cpx=terminal)
-    assert tcp_address(cpx) == ("10.0.0.2", 1502)
-    named = configured(hardware={"adapter": "other", "device": "cpx.lab"})
-    assert tcp_address(named) == ("cpx.lab", 502)
-    line = configured(hardware={"adapter": "other", "device": "/dev/ttyUSB7"})
-    assert serial_paths(line) == ["/dev/ttyUSB7"]
-    assert tcp_address(line) is None
-    # Other tables hold hosts and ports too, and none of them is the device's.
-    unknown = configured(hardware={"adapter": "other"})
-    assert tcp_address(unknown) is None
-    assert device.reachable(unknown).verdict is Verdict.INFO
+def test_what_is_in_memory_is_reached_and_what_cannot_be_tried_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert device.reachable(load()).verdict is Verdict.OK
+    monkeypatch.setattr(device.backends, "location", lambda configuration: Bus("can0/12"))
+    told = device.reachable(load())
+    assert told.verdict is Verdict.INFO
+    assert "can0/12" in told.text
+
+
+@pytest.mark.parametrize("adapter", ["festo-cpx", "esp32"])
+def test_a_device_without_an_address_is_not_looked_for(adapter: str) -> None:
+    nowhere = configured(hardware={"adapter": adapter})
+    assert device.reachable(nowhere).verdict is Verdict.INFO
+    assert "DeviceAllow" not in unit_text(nowhere, None, "ada")
 
 
 def test_sessions_need_a_disk_with_room(tmp_path: Path) -> None:
@@ -202,7 +209,7 @@ def test_the_lock_of_another_daemon_is_told_with_its_process() -> None:
     name = f"doctor-{os.getpid()}"
     own = configured(arm={"name": name})
     assert places.other_daemon(own).verdict is Verdict.OK
-    with lock("device", own.device_address):
+    with lock("device", registry.address(own)):
         held = places.other_daemon(own)
     assert held.verdict is Verdict.WARNING
     assert f"(process {os.getpid()})" in held.text

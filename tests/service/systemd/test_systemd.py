@@ -27,9 +27,10 @@ def parsed(text: str) -> configparser.ConfigParser:
 def with_device(path: str) -> str:
     """Unit of an arm on a serial line whose sessions have a folder of their own."""
     configuration = load()
-    hardware = configuration.hardware.model_copy(update={"adapter": "ctrl_p", "device": path})
+    hardware = configuration.hardware.model_copy(update={"adapter": "ctrl-p"})
+    port = configuration.ctrl_p.model_copy(update={"device": path})
     log = configuration.log.model_copy(update={"directory": "/data/arm sessions"})
-    changed = configuration.model_copy(update={"hardware": hardware, "log": log})
+    changed = configuration.model_copy(update={"hardware": hardware, "ctrl_p": port, "log": log})
     return unit_text(changed, Path("/etc/pneuarm/100 % $lab.toml"), "ada")
 
 

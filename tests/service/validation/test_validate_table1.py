@@ -11,7 +11,7 @@ from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
 from pneuarm.controllers.kinematics.models.cosserat_rod import CosseratRod, RodProperties
 from pneuarm.service.validation.gravity import cross_validate, fit_rows, hanging_tip
-from pneuarm.service.validation.table1 import BAR, COLUMNS, Table, identify, read_table
+from pneuarm.service.validation.table1 import BAR, COLUMNS, PrintedTable, identify, read_table
 
 SHARED = (
     "pressure_bar,y_measured_mm,z_measured_mm,y_cc_mm,z_cc_mm,error_y_percent,error_z_percent\n"
@@ -21,11 +21,11 @@ SHARED = (
 )
 
 
-def computed_mm(table: Table) -> np.ndarray:
+def computed_mm(table: PrintedTable) -> np.ndarray:
     return 1e3 * identify(table).tip_m(table.column("pressure_bar", BAR))
 
 
-def printed_mm(table: Table) -> np.ndarray:
+def printed_mm(table: PrintedTable) -> np.ndarray:
     return np.stack([table.column("y_cc_mm"), table.column("z_cc_mm")], axis=-1)
 
 
@@ -67,7 +67,7 @@ def test_from_the_tables_own_millimetres_its_percentages_follow_exactly(axis: st
 def test_percentages_are_cut_not_rounded() -> None:
     printed = dict(read_table().printed)
     printed["error_y_percent"] = (Decimal("1.00"), Decimal("1.000"), Decimal("1"))
-    assert [str(value) for value in Table(printed).cut_errors_percent("y")] == [
+    assert [str(value) for value in PrintedTable(printed).cut_errors_percent("y")] == [
         "9.91",  # 9.9138
         "9.677",  # 9.6774
         "12",  # 12.80
@@ -89,8 +89,8 @@ def test_the_fit_on_two_rows_does_not_see_the_third() -> None:
     spoilt["y_measured_mm"] = (Decimal("20.9"), Decimal("33.6"), Decimal("99"))
     spoilt["z_measured_mm"] = (Decimal("178.2"), Decimal("179.9"), Decimal("9"))
     arm = identify(table)
-    assert identify(Table(spoilt)) == arm
-    assert fit_rows(Table(spoilt), arm, [0, 1]) == fit_rows(table, arm, [0, 1])
+    assert identify(PrintedTable(spoilt)) == arm
+    assert fit_rows(PrintedTable(spoilt), arm, [0, 1]) == fit_rows(table, arm, [0, 1])
 
 
 def test_without_weight_the_elastica_is_an_arc() -> None:
@@ -118,7 +118,7 @@ def test_the_elastica_is_the_rod_that_does_not_stretch(weight_over_bending: floa
     [
         ((0.0, 0.5, 1.0), "length_m = 0"),
         ((np.nan, 0.5, 1.0), "length_m = nan"),
-        ((0.2, 7.0, 1.0), "theta_rad = 7: .*full turn"),
+        ((0.2, 7.0, 1.0), "theta_rad = 7"),
         ((0.2, 0.5, np.inf), "weight_over_bending_per_m2 = inf"),
     ],
 )
@@ -130,21 +130,21 @@ def test_an_elastica_that_cannot_be_is_refused(arguments: tuple[float, ...], tex
 @pytest.mark.parametrize("rows", [[], [3], [-1, 0]])
 def test_a_fit_on_rows_that_are_not_there_is_refused(rows: list[int]) -> None:
     table = read_table()
-    with pytest.raises(InvalidInput, match=r"rows = .*allowed are one or more of 0 to 2"):
+    with pytest.raises(InvalidInput, match=r"rows = .*0 to 2"):
         fit_rows(table, identify(table), rows)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "found no rows; the columns are pressure_bar"),
-        (SHARED.replace("y_cc_mm", "y"), "found pressure_bar, y_measured_mm, z_measured_mm, y,"),
-        ("\n".join(SHARED.splitlines()[:3]), "has 2 rows"),
-        (SHARED.replace("33.6", "x"), r"row 2, y_measured_mm = 'x': it must be a number above 0"),
+        ("", ".*".join(COLUMNS)),
+        (SHARED.replace("y_cc_mm", "y"), "z_measured_mm, y,.*y_cc_mm"),
+        ("\n".join(SHARED.splitlines()[:3]), "2 rows.*3"),
+        (SHARED.replace("33.6", "x"), r"row 2, y_measured_mm = 'x'.*above 0"),
         (SHARED.replace("33.6", "nan"), r"row 2, y_measured_mm = 'nan'"),
         (SHARED.replace("33.6", "-33.6"), r"row 2, y_measured_mm = '-33.6'"),
         (SHARED.replace(",12.8,0.5", ""), r"row 3, error_y_percent = None"),
-        (SHARED.replace("12.8,0.5", "12.8,0.5,7"), r"row 3 has more values than the 7 columns"),
+        (SHARED.replace("12.8,0.5", "12.8,0.5,7"), "row 3.*7 columns"),
     ],
 )
 def test_a_wrong_table_is_refused(tmp_path: Path, text: str, message: str) -> None:
@@ -156,10 +156,10 @@ def test_a_wrong_table_is_refused(tmp_path: Path, text: str, message: str) -> No
 
 
 def test_a_table_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="cannot be read"):
+    with pytest.raises(ConfigurationError, match=r"none\.csv"):
         read_table(tmp_path / "none.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigurationError, match="cannot be read"):
+    with pytest.raises(ConfigurationError, match=r"binary\.csv"):
         read_table(tmp_path / "binary.csv")
 
 

@@ -8,16 +8,19 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.errors import TargetRejected
 from pneuarm.controllers.targets.targets import (
+    KINDS,
     DirectionTarget,
     LawName,
     LengthsTarget,
     PointTarget,
     PoseTarget,
     PositionTarget,
+    PostureTarget,
     PressuresTarget,
     TasksTarget,
     TwistTarget,
 )
+from pneuarm.controllers.targets.together import COMBINED
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import JSON, decode
 from pneuarm.service.client.target_messages import (
@@ -56,6 +59,19 @@ def at_point(message: pb.Target, point: str) -> pb.Target:
 
 def twist(linear: tuple[float, ...], angular: tuple[float, ...] | None = None) -> pb.Target:
     return twist_target(linear, angular, "base", "tip")
+
+
+def test_every_kind_of_target_has_its_field_and_its_number_on_the_wire() -> None:
+    fields = [field.name for field in pb.Target.DESCRIPTOR.oneofs_by_name["target"].fields]
+    assert list(KINDS) == fields
+    for name, kind in KINDS.items():
+        assert pb.TargetKind.Value(name.upper()) == kind.kind
+    assert len(pb.TargetKind.keys()) == len(KINDS) + 1  # NO_TARGET
+
+
+def test_what_may_be_one_of_several_tasks_is_what_the_message_has() -> None:
+    fields = [field.name for field in pb.WeightedTask.DESCRIPTOR.oneofs_by_name["task"].fields]
+    assert {kind.name for kind in COMBINED} == set(fields)
 
 
 REFUSED = [
@@ -234,6 +250,12 @@ def weighted(kind: str, weight: float, **fields: object) -> pb.WeightedTask:
     return task
 
 
+def at_the_tip() -> pb.WeightedTask:
+    task = weighted("point", 1.0)
+    task.point.station = 1.0
+    return task
+
+
 def together(*tasks: pb.WeightedTask) -> pb.Target:
     return pb.Target(tasks=pb.TasksTarget(tasks=tasks))
 
@@ -255,6 +277,7 @@ def together(*tasks: pb.WeightedTask) -> pb.Target:
         (together(weighted("position", 1.0), weighted("pose", 1.0)), "position and pose, which"),
         (together(weighted("direction", 1.0), weighted("pose", 1.0)), "direction and pose, which"),
         (together(weighted("point", 1.0), weighted("point", 1.0)), "tasks holds point twice"),
+        (together(at_the_tip(), weighted("position", 1.0)), "point and position, which contradict"),
         (together(weighted("position", 1.0), weighted("", 1.0)), "an empty task"),
     ],
 )
@@ -278,7 +301,12 @@ def test_direction_point_and_tasks_become_targets() -> None:
         together(weighted("pose", 2.0), weighted("point", 0.5), weighted("posture", 1.0))
     )
     assert isinstance(several, TasksTarget)
-    assert several.weights == ((2.0, 2.0), (0.5, 0.5), (1.0, 1.0))
+    assert [(type(task), task.weight) for task in several.targets] == [
+        (PoseTarget, 2.0),
+        (PointTarget, 0.5),
+        (PostureTarget, 1.0),
+    ]
+    assert several.targets[0].orientation_weight == 2.0
     apart = PAPER.target(together(weighted("pose", 2.0, orientation_weight=0.25)))
     assert isinstance(apart, TasksTarget)
-    assert apart.weights == ((2.0, 0.25),)
+    assert (apart.targets[0].weight, apart.targets[0].orientation_weight) == (2.0, 0.25)

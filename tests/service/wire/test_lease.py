@@ -2,7 +2,7 @@
 
 import pytest
 
-from pneuarm.controllers.arm.errors import LeaseRefused, TargetRejected
+from pneuarm.controllers.arm.errors import LeaseRefused, MessageRejected, TargetRejected
 from pneuarm.service.wire.lease import Lease
 
 TIMEOUT_S = 5.0
@@ -155,5 +155,5 @@ def test_the_secret_is_in_no_event() -> None:
 
 @pytest.mark.parametrize("client", ["", "x" * 65])
 def test_a_holder_has_a_name_to_be_told(client: str) -> None:
-    with pytest.raises(LeaseRefused, match="1 to 64 characters"):
+    with pytest.raises(MessageRejected, match="client_id must have 1 to 64"):
         Lease(TIMEOUT_S).take(client, "", False, 0.0)

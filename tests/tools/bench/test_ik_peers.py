@@ -46,6 +46,4 @@ def test_without_the_peers_one_sentence_says_what_to_do(
     assert ik_peers.main() == 1
     said = capsys.readouterr()
     assert said.out == ""
-    assert said.err == (
-        "the peers are not installed (No module named 'qpsolvers'); run: make bench-setup\n"
-    )
+    assert all(fact in said.err for fact in ("qpsolvers", "make bench-setup"))

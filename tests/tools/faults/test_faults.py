@@ -10,8 +10,9 @@ import pytest
 from tools.faults import client_faults, process_faults
 from tools.faults.campaign import run_campaign
 from tools.faults.device_audit import audit_device
-from tools.faults.fault import Fault, Injection, Row
+from tools.faults.fault import Fault, Row
 from tools.faults.fuzz import Garbage
+from tools.faults.injection import Injection
 from tools.faults.report import BEGIN, END, Report, write_again, write_page
 from tools.rig.arms import paper_arm
 

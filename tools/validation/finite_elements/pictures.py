@@ -74,12 +74,14 @@ def _shape(axes: Any, mesh: Mesh, solved: Array) -> None:
     faces, colours = _skin(mesh)
     depth = np.argsort(-solved[faces][:, :, 1].mean(axis=1))
     flat = [0, 2]
-    rest = PolyCollection(mesh.nodes[faces][:, :, flat], facecolor="none", edgecolor="#d5d8dc")
+    rest = PolyCollection(
+        list(mesh.nodes[faces][:, :, flat]), facecolor="none", edgecolor="#d5d8dc"
+    )
     rest.set_linewidth(0.3)
     axes.add_collection(rest)
     axes.add_collection(
         PolyCollection(
-            solved[faces[depth]][:, :, flat],
+            list(solved[faces[depth]][:, :, flat]),
             facecolor=[colours[face] for face in depth],
             edgecolor="#00000040",
             linewidth=0.25,

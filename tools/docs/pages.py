@@ -1,0 +1,51 @@
+"""The pages, and what makes each kind of table in them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tools.docs import configuration, messages, tables
+from tools.docs.regions import NoSuchTable, filled
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = tuple(sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]))
+
+#: What makes a table, by the first word of its name.
+MAKERS: dict[str, Callable[[str], str]] = {
+    "configuration": configuration.make,
+    "presets": tables.make_presets,
+    "keys": messages.make_topics,
+    "enums": messages.make_enums,
+    "message": messages.make_message,
+    "codes": messages.make_codes,
+    "modes": tables.make_modes,
+    "faults": tables.make_faults,
+    "exceptions": tables.make_exceptions,
+    "rooms": tables.make_rooms,
+    "simulator": tables.make_simulator,
+}
+
+
+def make(name: str, there: str = "") -> str:
+    """Return a table in the place of what is there; raises NoSuchTable where nothing makes it."""
+    maker = MAKERS.get(name.split()[0])
+    if maker is None:
+        raise NoSuchTable(f"nothing makes {name!r}; there are {', '.join(MAKERS)}")
+    made = maker(name)
+    return _kept(made, there) if maker is configuration.make else made
+
+
+def fresh(page: str) -> str:
+    """Return a page with all of its tables made anew."""
+    return filled(page, make)
+
+
+def _kept(made: str, there: str) -> str:
+    """Keep what is said of a key that says nothing of itself yet."""
+    old = {line.split(" | ")[0]: line for line in there.splitlines() if line.startswith("| `")}
+    lines = []
+    for line in made.splitlines():
+        before = old.get(line.split(" | ")[0], "")
+        if line.endswith("| |") and not before.endswith("| |") and before:
+            line = f"{line.removesuffix('| |')}| {before.rstrip('| ').rpartition(' | ')[2]} |"
+        lines.append(line)
+    return "\n".join(lines)

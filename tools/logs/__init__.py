@@ -1,0 +1,1 @@
+"""Logs on which something is tried."""
