@@ -1,6 +1,6 @@
 """What a calibration makes of a wrong configuration: refused in words, or found all the same.
 
-    .venv/bin/python tools/bench/bad_nominals.py --preset paper
+    .venv/bin/python -m tools.bench.bad_nominals --preset paper
 
 Each number of `[arm]` a tenth and ten times of what it should be, gravity the wrong way, valves
 exchanged, the frame of the tip poses turned, a stiff arm, and seeded mixtures of these. The
@@ -14,10 +14,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 

@@ -346,3 +346,21 @@ def test_a_mode_that_is_not_seen_is_left_out_by_name() -> None:
     assert any(text.startswith("mode not identified") for text in found.not_identified)
     assert found.response.mode_hz == truth.response.mode_hz
     assert found.response.lag_s == pytest.approx(truth.response.lag_s, rel=0.1)
+
+
+def test_the_derivatives_of_a_direction_are_those_of_the_direction() -> None:
+    rng = np.random.default_rng(5)
+    turned = rotation_from_vector(rng.normal(0, 1, 3))
+    pose = np.concatenate([rng.normal(0, 0.1, 3), turned.reshape(-1)])[None]
+    frames = Frames(rotation_from_vector(rng.normal(0, 1, 3)), np.ones(3), np.zeros(3))
+    derivative = frames.directions_over_frames(pose)[0]
+    for index in range(9):
+        change = np.zeros(9)
+        change[index] = 1e-6
+        slope = (frames.moved(change).directions(pose) - frames.moved(-change).directions(pose))[0]
+        np.testing.assert_allclose(derivative[:, index], slope / 2e-6, atol=1e-8)
+    for index in range(12):
+        change = np.zeros((1, 12))
+        change[0, index] = 1e-6
+        slope = (frames.directions(pose + change) - frames.directions(pose - change))[0] / 2e-6
+        np.testing.assert_allclose(frames.directions_over_pose()[:, index], slope, atol=1e-8)
