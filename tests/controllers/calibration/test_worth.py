@@ -16,7 +16,7 @@ from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from tests.controllers.calibration.synthetic import COARSE_S, PAPER, other_arm, short_plan
 from tools.rig.foreign_arms import ForeignArm, recording_of, rod_of, sent_by
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 LENGTH_M = PAPER.total_rest_length_m
 
