@@ -3,11 +3,12 @@
 PYTHON ?= python3
 SECONDS ?= 30
 TIMES ?= 30
+DAMAGES ?= 10000
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup docs demo faults test test-slow test-lowest check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults damage test test-slow test-lowest check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -25,6 +26,10 @@ demo: setup
 # Every fault that docs/safety.md names, TIMES times at random moments; writes its table there.
 faults: setup
 	$(BIN)/python -m tools.faults --times $(TIMES) --write docs/safety.md
+
+# Logs of several kinds, damaged at random; says what was lost, or that nothing was.
+damage: setup
+	$(BIN)/python -m tools.logs.damage --times $(DAMAGES)
 
 # Two workers: processes that need their time on one, everything else on the other.
 test: check

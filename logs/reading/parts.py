@@ -14,7 +14,7 @@ from mcap.records import Channel
 from mcap.well_known import MessageEncoding
 
 from pneuarm.controllers.arm.errors import LogError
-from pneuarm.logs.reading.walk import GoodChunk, GoodRecord, read_summary, walk
+from pneuarm.logs.reading.walk import GoodChunk, GoodRecord, Stored, read_summary, walk
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import INFO, LOGGED, Topic, split_key
 
@@ -45,8 +45,11 @@ def identity(path: Path) -> Identity | None:
     for piece in walk(path):
         if isinstance(piece, GoodChunk):
             return _identity(path, piece)
-        if isinstance(piece, GoodRecord) and topic_of(piece.record):  # written without chunks
-            return Identity(path.stem, None, 0)
+        if isinstance(piece, GoodRecord):
+            if topic_of(piece.record) is not None:  # of a file that was written without chunks
+                return Identity(path.stem, None, 0)
+            if isinstance(piece.record, Stored):  # of somebody else, and maybe very long
+                return None
     return None
 
 

@@ -25,7 +25,7 @@ from pneuarm.logs.reading.walk import (
     walk,
 )
 from pneuarm.logs.rings.rings import HOLD_S
-from pneuarm.logs.rings.tick import ticks_from_states
+from pneuarm.logs.rings.tick import tick_dtype, ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import INFO, STATE, Topic, split_key
 
@@ -168,23 +168,21 @@ class LogReader:
 
         An hour of a whole tick takes gigabytes: ``names`` are the only fields that are kept.
         """
-        kept = None if names is None else ["sequence", *(n for n in names if n != "sequence")]
-        batches = [batch if kept is None else _only(batch, kept) for batch in self.tick_batches()]
-        if not batches:
-            empty = ticks_from_states([], self.n_sections)
-            return empty if kept is None else _only(empty, kept)
-        ticks = np.concatenate(batches)
+        whole = tick_dtype(self.n_sections)
+        wanted = whole.names or () if names is None else dict.fromkeys(("sequence", *names))
+        at_most = sum(raw.topic is STATE for raw in self.raw())
+        ticks = np.zeros(at_most, dtype=[(name, whole[name]) for name in wanted])
+        count = 0
+        for batch in self.tick_batches():
+            batch = batch[: at_most - count]  # a log that is being written has more by now
+            for name in wanted:
+                ticks[name][count : count + len(batch)] = batch[name]
+            count += len(batch)
+        ticks = ticks[:count]
         numbers = ticks["sequence"]
         if (numbers[1:] > numbers[:-1]).all():
             return ticks
         return ticks[np.unique(numbers, return_index=True)[1]]
-
-
-def _only(ticks: np.ndarray, names: list[str]) -> np.ndarray:
-    kept = np.zeros(len(ticks), dtype=[(name, ticks.dtype[name]) for name in names])
-    for name in names:
-        kept[name] = ticks[name]
-    return kept
 
 
 def _learn(topics: Topics, records: Iterable[object]) -> None:

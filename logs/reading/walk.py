@@ -248,7 +248,8 @@ class _Walk:
 
     def _is_cut(self, begin: int, end: int) -> bool:
         """Say whether these bytes are the beginning of a record, cut off by the end of the file."""
-        if end != self._file.size:
+        closing = self._file.read(max(0, self._file.size - len(MCAP0_MAGIC)), len(MCAP0_MAGIC))
+        if end != self._file.size or closing == MCAP0_MAGIC:
             return False
         head = self._file.read(begin, _RESUME_BYTES + 4 + _LENGTH.size)
         if len(head) < _HEAD.size:

@@ -37,6 +37,8 @@ def state_line(state: pb.ArmState) -> str:
         parts.append(f"{kind}{goal} {reach}, error {1e3 * state.target_error_m:.2f} mm")
     parts.append(f"lengths {millimetres(state.length_estimated_m)} mm")
     parts.append(f"pressures {bars(state.pressure_measured_pa)} bar")
+    if state.log_missed:
+        parts.append(f"THE LOG LACKS {state.log_missed} records")
     return "  ".join(parts)
 
 

@@ -81,11 +81,15 @@ class LoopSettings:
 
 @dataclass(frozen=True)
 class Timing:
-    """What the clock says of this waking; ``compute_s`` is of the tick before."""
+    """What is known of this waking from outside of the loop; ``compute_s`` is of the tick before.
+
+    ``log_missed`` is how many ticks and messages the recorder has lost.
+    """
 
     late_s: float = 0.0
     compute_s: float = 0.0
     overruns: int = 0
+    log_missed: int = 0
 
 
 @dataclass(slots=True)
@@ -126,7 +130,7 @@ class Loop:
         self._allowed_pa = self._zeros  # what the guard let through last
         self._now_ns = settings.start_ns
         self._tick = Tick(
-            heading=Heading(0, settings.start_unix_ns, 0.0, 0.0, 0),
+            heading=Heading(0, settings.start_unix_ns, 0.0, 0.0, 0, 0),
             mode=self._modes.mode,
             active_faults=0,
             measured_pa=None,
@@ -205,7 +209,14 @@ class Loop:
 
     def _heading(self, timing: Timing) -> Heading:
         sequence = self._tick.heading.sequence + 1
-        return Heading(sequence, self._unix_ns(), timing.late_s, timing.compute_s, timing.overruns)
+        return Heading(
+            sequence,
+            self._unix_ns(),
+            timing.late_s,
+            timing.compute_s,
+            timing.overruns,
+            timing.log_missed,
+        )
 
     def _take(
         self, commands: list[Command], measurement: Measurement | None, replies: list[ModeReply]

@@ -89,7 +89,7 @@ class ControlProcess:
             wake = clock.wait()
             begin = time.monotonic_ns()
             overruns += wake.skipped
-            timing = Timing(wake.late_ns * 1e-9, compute_s, overruns)
+            timing = Timing(wake.late_ns * 1e-9, compute_s, overruns, self._shared.recorder.missed)
             self._tick(wake.due_ns, timing)
             compute_s = (time.monotonic_ns() - begin) * 1e-9
 

@@ -29,6 +29,7 @@ class Heading(NamedTuple):
     wake_latency_s: float
     compute_s: float
     overruns: int
+    log_missed: int
 
 
 class ValveCommand(NamedTuple):
@@ -183,6 +184,7 @@ def values_of(tick: Tick, tool_m: Array) -> dict[str, Any]:
         "tip_offset_m": steered.tip_offset_m,
         "tip_offset_orientation_xyzw": steered.tip_offset_quaternion_xyzw,
         "tip_poses_refused": steered.tip_poses_refused,
+        "log_missed": heading.log_missed,
     }
 
 

@@ -9,6 +9,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from multiprocessing import get_context
 
 from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
@@ -42,8 +43,8 @@ HEARTBEAT_S = 0.1
 _FIRST_TICK_S = 20.0
 _END_S = 5.0
 
-#: A recorder that gets no further for this long at the end is stuck.
-_RECORDER_PATIENCE_S = 30.0
+#: A recorder that still gets further after this much of the end asks for more time than usual.
+_LONG_END_S = 10.0
 
 #: The end takes no longer than this, but for a recorder that still gets further: more than all its
 #: patience together.
@@ -326,6 +327,7 @@ class Supervisor:
         # Nothing below waits without a limit; should the end stand still all the same, this says
         # where, and ends it: control vents by itself when its supervisor is gone.
         faulthandler.dump_traceback_later(LAST_RESORT_S, exit=True)
+        self._end_began_s = time.monotonic()
         control = self._children.get("control")
         if control is not None:
             self._control_pipe.send(Shutdown())
@@ -336,25 +338,27 @@ class Supervisor:
             child = self._children.get(name)
             if child is not None and name != "recorder":  # which has something to write
                 child.end_if_loading()
-            if child is not None and not child.end(*self._patience(name)):
+            progress = partial(self._progress, name)
+            if child is not None and not child.end(self._patience_s(name), progress):
                 self._say(f"WARNING    the {name} process did not end by itself and was killed")
         self._announcer.step()
         if "recorder" in self._children and (lacks := self._log_watch.lacks()):
             self._say(f"WARNING    {lacks}")
 
-    def _patience(self, name: str) -> tuple[float, Callable[[], object]]:
-        """How long a process may take to end, from where it was last seen to get further."""
-        if name == "recorder":
-            return _RECORDER_PATIENCE_S, self._recorded
-        return (6.0 if name == "device" else 2.0), lambda: None
+    @staticmethod
+    def _patience_s(name: str) -> float:
+        """How long a process may take to end, or to get further with what it still has to do."""
+        return {"recorder": 30.0, "device": 6.0}.get(name, 2.0)
 
-    def _recorded(self) -> object:
-        """Say how far the recorder is; as long as it gets further, nobody ends the end."""
+    def _progress(self, name: str) -> object:
+        """Say how far a process is; as long as the recorder gets further, nobody ends the end."""
+        if name != "recorder":
+            return None
         recorded = self._log_watch.recorded()
-        if recorded != self._last_recorded:
-            self._last_recorded = recorded
+        if recorded != self._last_recorded and time.monotonic() - self._end_began_s > _LONG_END_S:
             faulthandler.dump_traceback_later(LAST_RESORT_S, exit=True)
             self._service_manager.needs_longer(LAST_RESORT_S)
+        self._last_recorded = recorded
         return recorded
 
     _last_recorded: object = None

@@ -17,11 +17,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import MCAP0_MAGIC
 
 from pneuarm.controllers.arm.errors import LogError
 from pneuarm.logs.reading.reader import LogReader
@@ -227,6 +229,17 @@ def _by_key(found: "Counter[Found]") -> dict[str, int]:
     return dict(counts)
 
 
+def _only_cut(sample: Sample, damaged: bytes, mended: Path) -> bool:
+    """Say whether all that mending dropped is one piece at the end, of which the rest is gone."""
+    one, other = (np.frombuffer(data, np.uint8) for data in (damaged, mended.read_bytes()))
+    size = min(len(one), len(other))
+    differ = np.flatnonzero(one[:size] != other[:size])
+    dropped = damaged[differ[0] if len(differ) else size :]
+    if dropped.endswith(MCAP0_MAGIC) or any(raw in dropped for _, raw, _ in sample.chunks):
+        return False
+    return len(dropped) < max(len(raw) for _, raw, _ in sample.chunks)
+
+
 def _mend(
     sample: Sample,
     folder: Path,
@@ -240,8 +253,7 @@ def _mend(
         mended = repair(path)
         if mended.kept is not None and mended.kept.read_bytes() != files[path.name]:
             verdict.lost_originals.append(f"{what}: {mended.kept.name} is not the original")
-        whole = sample.files[path.name].startswith(files[path.name])  # nothing but cut off
-        if mended.kept is None and not whole:
+        if mended.kept is None and not _only_cut(sample, files[path.name], path):
             verdict.lost_originals.append(f"{what}: {path.name} was changed and is not kept")
         if mended.path is not None:
             with mended.path.open("rb") as file:

@@ -1,6 +1,7 @@
 """A recorder in this process, on real rings, with a clock that the test moves."""
 
 import multiprocessing
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -46,9 +47,9 @@ class Session:
     def __init__(self, directory: Path, clock: FakeTime, arm: Arm | None = None) -> None:
         self.clock = clock
         arm = arm or paper_arm()
-        self._info = pb.Info()
-        self._info.CopyFrom(INFO)
-        self._info.bend_max_rad[:] = arm.per_section("bend_max_rad").reshape(-1).tolist()
+        self.info = pb.Info()
+        self.info.CopyFrom(INFO)
+        self.info.bend_max_rad[:] = arm.per_section("bend_max_rad").reshape(-1).tolist()
         self._n_sections = arm.n_sections
         self.rings = Rings.create(CONTEXT, arm.n_sections, RATE_HZ)
         self.status = RecorderStatus.create(CONTEXT)
@@ -65,6 +66,7 @@ class Session:
         self._writers = [MessageWriter(memory) for memory in self.rings.messages()]
         self._random = np.random.default_rng(7)
         self._events = 0
+        self._first = 0
 
     @property
     def path(self) -> Path:
@@ -74,25 +76,34 @@ class Session:
         self.settings = replace(self.settings, **changes)  # type: ignore[arg-type]
 
     def recorder(self) -> Recorder:
-        return Recorder(self.settings, self._info, self.rings, self.status)
+        return Recorder(self.settings, self.info, self.rings, self.status)
 
     def write_ticks(self, count: int) -> None:
         """Ticks of numbers that do not compress away."""
         for _ in range(count):
             tick = new_tick(self._n_sections)
             tick["sequence"] = self._ticks.last_sequence + 1
-            tick["time_unix_ns"] = START_NS + self._ticks.last_sequence * PERIOD_NS
+            tick["time_unix_ns"] = START_NS + (self._ticks.last_sequence - self._first) * PERIOD_NS
             tick["pressure_measured_pa"] = self._random.normal(size=(self._n_sections, 3))
             tick["tip_estimated_position_m"] = self._random.normal(size=3)
             tick["tip_estimated_orientation_xyzw"] = (0.0, 0.0, 0.0, 1.0)
             self._ticks.write(tick.tobytes())
 
-    def write_events(self, count: int) -> None:
+    def begin_at(self, sequence: int) -> None:
+        """Let every ring count as after very many records, all of them recorded."""
+        self._first = sequence
+        for memory in (self.rings.ticks, *self.rings.messages()):
+            struct.pack_into("@Q", memory.view(), 0, sequence)
+        self._ticks = RingWriter(self.rings.ticks)
+        self._writers = [MessageWriter(memory) for memory in self.rings.messages()]
+        self.status.publish_progress(sequence + 1, [sequence + 1] * len(self._writers), 0)
+
+    def write_events(self, count: int, time_unix_ns: int = START_NS) -> None:
         """Numbered events, from all writing processes in turn."""
         for _ in range(count):
             self._events += 1
-            event = pb.Event(text=f"event {self._events}", time_unix_ns=START_NS)
-            self._writers[self._events % len(self._writers)].write(EVENT, event, START_NS)
+            event = pb.Event(text=f"event {self._events}", time_unix_ns=time_unix_ns)
+            self._writers[self._events % len(self._writers)].write(EVENT, event, time_unix_ns)
 
     def flush(self, recorder: Recorder) -> None:
         """Let the recorder take everything and put it on the disk."""

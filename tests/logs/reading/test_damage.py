@@ -30,7 +30,7 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Sample]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(seed=SEED)
 def test_random_damage(
     samples: dict[str, Sample], tmp_path_factory: pytest.TempPathFactory, kind: str, seed: int

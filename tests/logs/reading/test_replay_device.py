@@ -17,7 +17,7 @@ START_NS = 1_800_000_000_000_000_000
 PERIOD_NS = 10_000_000
 
 
-def record(path: Path, arm: Arm, ticks: int) -> Path:
+def record(path: Path, arm: Arm, ticks: int, hole_at: int = 1 << 30) -> Path:
     """Write a session of an arm: at tick k chamber c is measured at 10 (k + c) Pa, 0.2 + k um."""
     part = Part(path, arm.name)
     info = pb.Info(
@@ -28,7 +28,7 @@ def record(path: Path, arm: Arm, ticks: int) -> Path:
     )
     part.write(INFO, info.SerializeToString(), START_NS)
     for tick in range(ticks):
-        stamp_ns = START_NS + tick * PERIOD_NS
+        stamp_ns = START_NS + tick * PERIOD_NS + (tick >= hole_at) * 86_400 * 10**9
         state = pb.ArmState(
             sequence=tick + 1,
             time_unix_ns=stamp_ns,
@@ -52,6 +52,15 @@ def test_readings_come_in_their_time_from_the_first_on(tmp_path: Path) -> None:
             np.testing.assert_allclose(reading.pressures_pa, expected)
             np.testing.assert_allclose(reading.lengths_m, 0.2 + 1e-6 * tick)
             assert reading.taken_s == pytest.approx(began_s + tick * 0.01, abs=1e-6)
+
+
+def test_a_hole_in_the_log_is_skipped(tmp_path: Path) -> None:
+    """Of a day: the reading behind it comes right after the one before."""
+    device = ReplayDevice(ARMS["paper"], record(tmp_path / "a.mcap", ARMS["paper"], 20, hole_at=10))
+    device.connect()
+    device.read(5.0)
+    pressures = [device.read(5.005 + 0.01 * tick).pressures_pa[0, 0] for tick in range(19)]
+    assert pressures == [10.0 * tick for tick in (*range(9), *range(10, 20))]
 
 
 def test_the_end_of_the_log_is_told(tmp_path: Path) -> None:

@@ -219,3 +219,106 @@ def test_finishing_may_be_tried_again(session: Session, monkeypatch: pytest.Monk
     recorder.finish()
     assert LogReader(session.path).finished
     assert recorded(session.path)[0] == list(range(1, 201))
+
+
+@pytest.mark.parametrize("start", [2**32 - 150, 2**32, 2**53, 2**62])
+def test_no_counter_of_a_tick_ends(session: Session, start: int) -> None:
+    """A daemon that has run for 49 days at 1 kHz, and its successor, write on."""
+    session.begin_at(start)
+    recorder = session.recorder()
+    session.write_ticks(300)
+    session.write_events(30)
+    session.flush(recorder)
+    session.write_ticks(100)
+    recorder.step()
+    del recorder
+    session.write_ticks(100)
+    session.recorder().finish()
+    ticks, texts = recorded(session.path)
+    assert ticks == list(range(start + 1, start + 501))
+    assert set(texts) == events(30)
+    assert session.status.missed == 0
+    summary = summarise(LogReader(session.path))
+    assert (summary.ticks, summary.missing_ticks) == (500, start)
+
+
+def test_messages_are_written_before_the_ticks_of_a_backlog(session: Session) -> None:
+    """However far behind it is: a recorder that is killed then has lost no event."""
+    recorder = session.recorder()
+    session.write_ticks(session.rings.ticks.capacity - 1)
+    session.write_events(20)
+    recorder.step()
+    recorder._part.flush()
+    assert set(recorded(session.path)[1]) == events(20)
+    recorder.finish()
+    assert summarise(LogReader(session.path)).missing_ticks == 0
+
+
+def test_what_was_written_out_of_order_is_read_in_the_order_of_time(session: Session) -> None:
+    """Events stand before the ticks of a backlog in the file, and are read where they happened."""
+    recorder = session.recorder()
+    session.write_ticks(session.rings.ticks.capacity // 2)
+    at_ns = START_NS + session.rings.ticks.capacity // 4 * PERIOD_NS
+    session.write_events(3, at_ns)
+    recorder.finish()
+    times = [entry.time_unix_ns for entry in LogReader(session.path)]
+    assert times == sorted(times)
+    assert times.count(at_ns) >= 4  # the events, and the tick of that moment
+
+
+def test_a_recorder_that_lags_gives_up_compression_before_ticks(session: Session) -> None:
+    recorder = session.recorder()
+    session.write_ticks(session.rings.ticks.capacity - 1)
+    recorder.step()
+    session.clock.now_s += 1.0
+    recorder.step()
+    assert session.status.behind > 0
+    assert not recorder._part.compress
+    session.flush(recorder)
+    assert session.status.behind == 0
+    assert recorder._part.compress
+    recorder.finish()
+    summary = summarise(LogReader(session.path))
+    assert summary.missing_ticks == 0
+    assert summary.messages[TIP.key] < summary.ticks / 5  # what the ticks tell was left out
+
+
+def test_what_a_recorder_lost_counts_on_with_its_successor(session: Session) -> None:
+    recorder = session.recorder()
+    session.write_ticks(session.rings.ticks.capacity + 500)
+    session.flush(recorder)
+    lost = session.status.missed_ticks
+    assert lost > 0
+    del recorder
+    session.recorder().finish()
+    assert (session.status.missed_ticks, session.status.missed_messages) == (lost, 0)
+
+
+def test_the_facts_are_repeated_so_that_a_damaged_beginning_does_not_take_them(
+    session: Session,
+) -> None:
+    recorder = session.recorder()
+    for _ in range(12):
+        session.write_ticks(10)
+        session.flush(recorder)
+    recorder.finish()
+    damaged = bytearray(session.path.read_bytes())
+    damaged[:2000] = bytes(2000)
+    session.path.write_bytes(damaged)
+    reader = LogReader(session.path)
+    assert reader.info == session.info
+    assert reader.damage
+
+
+def test_an_hour_is_read_in_little_memory(session: Session) -> None:
+    """As batches, or as the fields that are wanted: nothing grows with the length of a log."""
+    recorder = session.recorder()
+    session.write_ticks(3000)
+    recorder.finish()
+    reader = LogReader(session.path)
+    batches = list(reader.tick_batches())
+    assert max(map(len, batches)) <= 1000
+    assert sum(map(len, batches)) == 3000
+    some = reader.ticks(["time_unix_ns", "pressure_measured_pa"])
+    assert some.dtype.names == ("sequence", "time_unix_ns", "pressure_measured_pa")
+    assert some.itemsize < reader.ticks().itemsize / 10

@@ -69,3 +69,11 @@ def test_how_a_target_ended() -> None:
         "out of reach: length, Eq. (4) and pressure binds; the nearest the arm came is "
         "(51.0, 0.0, 200.0) mm, 12.3 mm away"
     )
+
+
+def test_a_state_says_while_the_log_lacks_something() -> None:
+    lacking = pb.ArmState()
+    lacking.CopyFrom(STATE)
+    lacking.log_missed = 1234
+    assert "1234" in state_line(lacking)
+    assert state_line(lacking).startswith(state_line(STATE))

@@ -134,7 +134,8 @@ def test_a_flood_of_events_is_no_flood_of_lines(terminal: Terminal) -> None:
     terminal.clock.now_s += 1.0
     terminal.tell("another")
     lines = terminal.step()
-    assert lines[0] == "(491 more events; all of them are in the log)"
+    assert "491" in lines[0]
+    assert "in the log" not in lines[0]  # which the recorder may not have written
     assert lines[1].endswith("another")
     terminal.clock.now_s += 1.0
     terminal.tell("later")

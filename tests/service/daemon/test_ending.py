@@ -96,11 +96,12 @@ def test_an_end_that_stands_still_says_where_and_ends(
 ) -> None:
     """With a recorder that hangs beyond all patience; the limit is lowered for the test."""
     program = (
-        "import sys, time; from service import supervisor; supervisor.LAST_RESORT_S = 1.0\n"
+        "import sys, time; from pneuarm.service.daemon import supervisor\n"
+        "supervisor.LAST_RESORT_S = 1.0\n"
         "def stand_still(self, patience_s): time.sleep(1000.0)\n"
         "supervisor.Child.join = stand_still\n"
         "sys.argv = ['pneuarm', 'run', sys.argv[1]]\n"
-        "if __name__ == '__main__': import pneuarm; pneuarm.main()\n"
+        "if __name__ == '__main__': from pneuarm.__main__ import main; main()\n"
     )
     daemon = Daemon(tmp_path)
     script = tmp_path / "standing_still.py"
