@@ -36,8 +36,9 @@ class Guard:
     """Turns any command into one that is allowed now.
 
     The slew counts from the last write that the device acknowledged, :meth:`acknowledge`, for
-    ``max_elapsed_s`` at most. Venting goes past the guard: it is always allowed, at any speed. ``supply_flow_max_pa_s`` limits the
-    sum of all rises in a second, for a supply that cannot feed every chamber at full slew.
+    ``max_elapsed_s`` at most. Venting goes past the guard: it is always allowed, at any speed.
+    ``supply_flow_max_pa_s`` limits the sum of all rises in a second, for a supply that cannot feed
+    every chamber at full slew.
     """
 
     #: A command older than this many periods, or than this time, whichever is longer, is void.

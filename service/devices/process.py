@@ -1,8 +1,8 @@
 """The device process: the guard and a blocking transport, away from the loop.
 
 It moves the arm only while control's commands are fresh. When they are not it sends zeros and then
-nothing at all, so that the device's own watchdog runs out if this was not enough. After a gap in its
-own exchanges it does not go on either: meanwhile the device may have vented by itself.
+nothing at all, so that the device's own watchdog runs out if this was not enough. After a gap in
+its own exchanges it does not go on either: meanwhile the device may have vented by itself.
 """
 
 import socket

@@ -70,7 +70,7 @@ def test_a_jump_is_refused_and_taken_when_it_lasts() -> None:
     setup = Setup()
     setup.run(4.0, OFFSET_M)
     kept = setup.observer.offset_m.copy()
-    away = OFFSET_M + np.array([0.05, 0.0, 0.0])
+    away = OFFSET_M + np.array([0.03, 0.0, 0.0])
     assert set(setup.run(0.05, away)) == {Verdict.REFUSED}
     assert setup.observer.offset_m == pytest.approx(kept, abs=SETTINGS.deadband_m)
     assert set(setup.run(0.3, OFFSET_M)) == {Verdict.TAKEN}

@@ -215,7 +215,7 @@ def test_a_process_that_stood_still_does_not_go_on(rig: Rig, where: str) -> None
     rig.run(0.2, SOME_PA)
     assert rig.state == LinkState.CONNECTED
     assert np.array_equal(rig.arm.setpoints_pa, ZEROS)
-    with pytest.raises(HardwareError, match="connected again|not talked to"):
+    with pytest.raises(HardwareError, match=r"connected again|not talked to"):
         rig.control.read(time.monotonic())
     if where == "between":
         assert not any(np.any(counts) for counts in rig.terminal.written[len(writes) :])
