@@ -4,7 +4,7 @@ import math
 
 from pneuarm.controllers.arm.arm import Array
 
-#: Of the way that the model's tip has gone, the measured one has gone this share at least.
+#: Of the way that the expected tip has gone, the measured one has gone this share at least.
 _LEAST_SHARE = 0.1
 
 #: A swing or a stiction that lasts no longer (s) than this says nothing about the sensor.
@@ -12,7 +12,7 @@ _LASTING_S = 0.3
 
 
 class GoesAlong:
-    """Compares both ways from where they last agreed: their share, along the model's way.
+    """Compares both ways from where they last agreed: their share, along the expected way.
 
     A sensor that stands still has gone nothing of it, one with a sign or axes exchanged the other
     way or across. A tip that something holds looks the same, and is to be corrected as little.
@@ -26,20 +26,20 @@ class GoesAlong:
         #: Whether the newest look has begun to compare anew: both have gone together until then.
         self.agreed = False
 
-    def look(self, measured_m: Array, predicted_m: Array, pause_s: float) -> bool:
-        """Take a measured tip (3,), the model's of the same time, and the time since the last.
+    def look(self, measured_m: Array, expected_m: Array, pause_s: float) -> bool:
+        """Take a measured tip (3,), the expected one of the same time, and the time since the last.
 
         Return whether the sensor is believed.
         """
         self.agreed = self._from is None
         if self._from is None:
-            self._from = measured_m, predicted_m
-        measured, predicted = measured_m - self._from[0], predicted_m - self._from[1]
-        way_m = math.sqrt(predicted @ predicted)
+            self._from = measured_m, expected_m
+        measured, expected = measured_m - self._from[0], expected_m - self._from[1]
+        way_m = math.sqrt(expected @ expected)
         if way_m < self._way_m:
             self._against_s = 0.0
-        elif measured @ predicted >= _LEAST_SHARE * way_m**2:
-            self._from, self._against_s = (measured_m, predicted_m), 0.0
+        elif measured @ expected >= _LEAST_SHARE * way_m**2:
+            self._from, self._against_s = (measured_m, expected_m), 0.0
             self.believed = self.agreed = True
         else:
             self._against_s += pause_s
