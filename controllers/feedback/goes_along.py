@@ -7,6 +7,9 @@ from pneuarm.controllers.arm.arm import Array
 #: Of the way that the expected tip has gone, the measured one has gone this share at least.
 _LEAST_SHARE = 0.1
 
+#: Within this share of the way the expected tip is still where the comparison began.
+_NEAR_SHARE = 0.2
+
 #: A swing or a stiction that lasts no longer (s) than this says nothing about the sensor.
 _LASTING_S = 0.3
 
@@ -21,10 +24,20 @@ class GoesAlong:
     def __init__(self, way_m: float) -> None:
         self._way_m = way_m
         self._from: tuple[Array, Array] | None = None
-        self._against_s = 0.0
+        self._against_s = self._near_s = 0.0
         self.believed = True
         #: Whether the newest look has begun to compare anew: both have gone together until then.
         self.agreed = False
+
+    @property
+    def near(self) -> bool:
+        """Whether the expected tip is still where the comparison began: nothing can be told yet."""
+        return self._near_s > 0.0
+
+    @property
+    def stands(self) -> bool:
+        """Whether it has been there for long."""
+        return self._near_s > _LASTING_S
 
     def look(self, measured_m: Array, expected_m: Array, pause_s: float) -> bool:
         """Take a measured tip (3,), the expected one of the same time, and the time since the last.
@@ -36,6 +49,8 @@ class GoesAlong:
             self._from = measured_m, expected_m
         measured, expected = measured_m - self._from[0], expected_m - self._from[1]
         way_m = math.sqrt(expected @ expected)
+        near = self.agreed or way_m < _NEAR_SHARE * self._way_m
+        self._near_s = self._near_s + pause_s if near else 0.0
         if way_m < self._way_m:
             self._against_s = 0.0
         elif measured @ expected >= _LEAST_SHARE * way_m**2:

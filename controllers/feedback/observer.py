@@ -139,7 +139,11 @@ class TipObserver:
             return Verdict.NOT_ALONG
         self._take(residual, position_m, verdict is Verdict.TAKEN and self.seen)
         if self._along.agreed:
-            self._trusted_before, self._trusted = self._trusted, self._fast
+            self._trusted_before = self._trusted
+        if self._along.agreed or self._along.near:
+            self._trusted = self._fast
+        if self._along.stands:
+            self._trusted_before = self._trusted
         self._follow_turn(rotation_vector(rotation @ turned.T))
         return verdict
 
