@@ -23,7 +23,7 @@ class GoesAlong:
 
     def __init__(self, way_m: float) -> None:
         self._way_m = way_m
-        self._from: tuple[Array, Array] | None = None
+        self._from: tuple[Array, Array, Array] | None = None
         self._against_s = self._near_s = 0.0
         self.believed = True
         #: Whether the newest look has begun to compare anew: both have gone together until then.
@@ -39,22 +39,27 @@ class GoesAlong:
         """Whether it has been there for long."""
         return self._near_s > _LASTING_S
 
-    def look(self, measured_m: Array, expected_m: Array, pause_s: float) -> bool:
-        """Take a measured tip (3,), the expected one of the same time, and the time since the last.
+    def look(
+        self, measured_m: Array, predicted_m: Array, corrected_m: Array, pause_s: float
+    ) -> bool:
+        """Take tips (3,) of one time, and how long (s) it is since the last.
 
-        Return whether the sensor is believed.
+        ``predicted_m`` is the model's, ``corrected_m`` that with the correction. What the correction
+        alone makes of one of them is no way that the tip must go: a load moves the first while the
+        tip stands, a correction that grows the second. Return whether the sensor is believed.
         """
         self.agreed = self._from is None
+        tips = (measured_m, predicted_m, corrected_m)
         if self._from is None:
-            self._from = measured_m, expected_m
-        measured, expected = measured_m - self._from[0], expected_m - self._from[1]
-        way_m = math.sqrt(expected @ expected)
-        near = self.agreed or way_m < _NEAR_SHARE * self._way_m
+            self._from = tips
+        measured, *ways = (now - then for now, then in zip(tips, self._from, strict=True))
+        shortest_m = min(math.sqrt(way @ way) for way in ways)
+        near = self.agreed or shortest_m < _NEAR_SHARE * self._way_m
         self._near_s = self._near_s + pause_s if near else 0.0
-        if way_m < self._way_m:
+        if shortest_m < self._way_m:
             self._against_s = 0.0
-        elif measured @ expected >= _LEAST_SHARE * way_m**2:
-            self._from, self._against_s = (measured_m, expected_m), 0.0
+        elif any(measured @ way >= _LEAST_SHARE * (way @ way) for way in ways):
+            self._from, self._against_s = tips, 0.0
             self.believed = self.agreed = True
         else:
             self._against_s += pause_s

@@ -123,9 +123,8 @@ class TipObserver:
         age_s = self._settings.delay_s + waited_s + self._delay_s
         predicted, turned = self.prediction.ago(age_s)
         residual, pause_s = position_m - predicted, min(self._since_pose_s, 1.0)
-        # With the correction: what the correction itself asks for is no way that the tip goes.
-        expected = predicted + self.offset_m
-        if not self._along.believed and not self._along.look(position_m, expected, pause_s):
+        tips = (position_m, predicted, predicted + self.offset_m)
+        if not self._along.believed and not self._along.look(*tips, pause_s):
             self._since_pose_s = 0.0
             self.refused += 1
             return Verdict.NOT_ALONG
@@ -133,7 +132,7 @@ class TipObserver:
         if verdict is Verdict.REFUSED:
             self.refused += 1
             return verdict
-        if not self._along.look(position_m, expected, pause_s):
+        if not self._along.look(*tips, pause_s):
             self._give_back()
             self.refused += 1
             return Verdict.NOT_ALONG

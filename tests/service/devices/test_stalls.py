@@ -15,10 +15,9 @@ from tools.rig.daemon import Daemon, arm, enough, health_of, keep_moving, wait_f
 from tools.rig.emulators import Emulator
 
 
-@pytest.mark.parametrize("stall_s", [0.13, 0.22, 0.25, 0.29])
+@pytest.mark.parametrize("stall_s", [0.2, 0.29])
 def test_a_device_process_that_slept_comes_back_with_zeros(tmp_path: Path, stall_s: float) -> None:
     with Emulator("festo-cpx", tmp_path) as emulator:
-        emulator.tables["festo_cpx"] |= {"watchdog_ms": 200}
         daemon = Daemon(tmp_path, emulator.tables).start()
         try:
             with daemon.client() as client:
