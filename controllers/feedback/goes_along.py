@@ -4,7 +4,7 @@ import math
 
 from pneuarm.controllers.arm.arm import Array
 
-#: Of the way that the expected tip has gone, the measured one has gone this share at least.
+#: Of the way that the model's tip has gone, the measured one has gone this share at least.
 _LEAST_SHARE = 0.1
 
 #: Within this share of the way the expected tip is still where the comparison began.
@@ -15,7 +15,7 @@ _LASTING_S = 0.3
 
 
 class GoesAlong:
-    """Compares both ways from where they last agreed: their share, along the expected way.
+    """Compares both ways from where they last agreed: their share, along those ways.
 
     A sensor that stands still has gone nothing of it, one with a sign or axes exchanged the other
     way or across. A tip that something holds looks the same, and is to be corrected as little.
@@ -44,9 +44,9 @@ class GoesAlong:
     ) -> bool:
         """Take tips (3,) of one time, and how long (s) it is since the last.
 
-        ``predicted_m`` is the model's, ``corrected_m`` that with the correction. What the correction
-        alone makes of one of them is no way that the tip must go: a load moves the first while the
-        tip stands, a correction that grows the second. Return whether the sensor is believed.
+        ``predicted_m`` is the model's, ``corrected_m`` that with the correction. What only the
+        correction moves is no way that the tip must go: a load moves the first while the tip
+        stands, a correction that grows the second. Return whether the sensor is believed.
         """
         self.agreed = self._from is None
         tips = (measured_m, predicted_m, corrected_m)

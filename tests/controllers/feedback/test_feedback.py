@@ -116,3 +116,11 @@ def test_the_estimate_says_what_it_rests_on() -> None:
     assert seen.source == EstimateSource.TIP_POSE
     assert seen.position_m == pytest.approx(setup.position + OFFSET_M, abs=1e-4)
     assert seen.sigma_m < 1e-3
+
+
+def test_a_first_correction_larger_than_the_way_that_is_judged_is_believed() -> None:
+    """The arm stands, and only the correction moves: no reason to doubt the camera."""
+    setup = Setup()
+    large = np.array([0.03, 0.0, 0.0])
+    assert set(setup.run(6.0, large)) == {Verdict.TAKEN}
+    assert setup.observer.offset_m == pytest.approx(large, abs=SETTINGS.deadband_m)
