@@ -3,7 +3,6 @@
 import argparse
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from pneuarm.service.calibration.page import page
 from pneuarm.service.calibration.recordings import read_logs, require_seen
 from pneuarm.service.calibration.values import errors_mm, residuals_text, value_text, values
 from pneuarm.service.client.client import Client
-from pneuarm.service.configuration.configuration import Configuration, check
+from pneuarm.service.configuration.configuration import Configuration, of_text
 
 _TOML, _PAGE = "calibration.toml", "calibration.html"
 
@@ -45,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
     name = arguments.arm or "paper"
     with Client(name, arguments.connect, "calibrate", arguments.zenoh_config) as client:
-        configuration = check(tomllib.loads(client.info().config_toml), "the daemon")
+        configuration = of_text(client.info().config_toml, "the daemon")
         arm = configuration.build_arm()
         moves = plan(arm)
         require_tip(client)
