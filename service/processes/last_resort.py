@@ -19,6 +19,7 @@ _REMEDIES = {
     errno.EDQUOT: "free some space",
     errno.EROFS: "name a folder on a disk that can be written to",
     errno.ENOMEM: "free some memory, or raise ulimit -v",
+    errno.EIO: "a disk or a device fails: see dmesg",
     errno.EAGAIN: "end other programs, or raise ulimit -u",
     errno.EACCES: "see who may read and write there",
     errno.EPERM: "see who may read and write there",
