@@ -4,24 +4,26 @@ A measured position is ``world = R (tip + R_tip marker) + t``. The rotation star
 motion that lays the model's tips over the measured ones (Kabsch), and is refined by a small turn.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 
 
 @dataclass(frozen=True)
 class Frames:
     """``rotation`` (3, 3) and ``translation_m`` (3,) from the base to the measuring frame.
 
-    ``marker_m`` (3,) is the marker in the tip frame. Where the marker sits turned on the tip cannot
-    be seen in its position.
+    ``marker_m`` (3,) is the marker in the tip frame, ``axis`` (3,) where the tip points in the
+    frame of the marker. How the marker sits turned about that axis is not asked for.
     """
 
     rotation: Array
     translation_m: Array
     marker_m: Array
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def measured_m(self, pose: Array) -> Array:
         """Measured positions (batch, 3) of tips (batch, 12): positions, then rotations by rows."""
@@ -44,29 +46,37 @@ class Frames:
         derivative[:, :, 6:] = self.rotation @ pose[:, 3:].reshape(-1, 3, 3)
         return derivative
 
+    def directions(self, pose: Array) -> Array:
+        """Directions (batch, 3) in which tips (batch, 12) point, in the measuring frame."""
+        return pose[:, [5, 8, 11]] @ self.rotation.T
+
+    def directions_over_pose(self) -> Array:
+        """Derivative (3, 12) of a direction over a tip's pose."""
+        derivative = np.zeros((3, 12))
+        derivative[:, [5, 8, 11]] = self.rotation
+        return derivative
+
+    def directions_over_frames(self, pose: Array) -> Array:
+        """Derivative (batch, 3, 9) of the directions, as :meth:`over_frames`."""
+        derivative = np.zeros((len(pose), 3, 9))
+        directions = self.directions(pose)
+        for axis, unit in enumerate(np.eye(3)):
+            derivative[:, :, axis] = np.cross(unit, directions)
+        return derivative
+
     def moved(self, change: Array) -> "Frames":
         """Frames after a small turn (3,), translation (3,) and marker (3,)."""
-        return Frames(
-            rotation_of(change[:3]) @ self.rotation,
-            self.translation_m + change[3:6],
-            self.marker_m + change[6:],
+        return replace(
+            self,
+            rotation=rotation_from_vector(change[:3]) @ self.rotation,
+            translation_m=self.translation_m + change[3:6],
+            marker_m=self.marker_m + change[6:],
         )
 
 
 def in_base() -> Frames:
     """Frames of a measurement of the tip itself in the base."""
     return Frames(np.eye(3), np.zeros(3), np.zeros(3))
-
-
-def rotation_of(vector_rad: Array) -> Array:
-    """Rotation (3, 3) by a vector (3,), rad: Rodrigues' formula."""
-    angle = float(np.linalg.norm(vector_rad))
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = vector_rad / angle
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned: Array = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
-    return turned
 
 
 def aligned(tips_m: Array, measured_m: Array) -> Frames:

@@ -5,6 +5,7 @@ clipped to ``input - w .. input + w``.
 """
 
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,18 @@ def play_outputs(pressures_pa: Array, half_width_pa: Array) -> tuple[Array, Arra
     rows = np.where(pushed != 0.0, np.arange(len(low))[:, None], 0)
     slopes = np.take_along_axis(pushed, np.maximum.accumulate(rows, axis=0), axis=0)
     return outputs.reshape(pressures_pa.shape), slopes.reshape(pressures_pa.shape)
+
+
+def turning_points(pressures_pa: Array, kept: "np.ndarray[Any, np.dtype[np.int64]]") -> Array:
+    """Samples (rows, ascending) that give the play the same outputs at ``kept``: where it may turn.
+
+    Between two turns a play depends on their ends alone.
+    """
+    flat = pressures_pa.reshape(len(pressures_pa), -1)
+    ways = np.sign(np.diff(flat, axis=0))
+    turns = np.flatnonzero((ways[1:] != ways[:-1]).any(axis=1)) + 1
+    rows: Array = np.union1d(turns, np.union1d(kept, [0]))
+    return rows
 
 
 def _clipped(low: Array, high: Array) -> Array:

@@ -1,7 +1,8 @@
 """The parameters of a calibration: numbers near their nominal values, and the arm they stand for.
 
 Every parameter is scaled, so that 1 is a large change of it: what the configuration says is 0 (for
-a length, its share of the nominal one) and the prior's standard deviations are plain numbers.
+a length or a lengthening, the logarithm of its ratio to the nominal one, so that ten times and a
+tenth are as far) and the prior's standard deviations are plain numbers.
 
 Of the nine gains from three pressures to three lengths a tip pose cannot tell a scale from the
 lengthening, and a common ratio of bending to stretching from the chamber offset: the coupling has
@@ -26,18 +27,19 @@ COUPLINGS: Array = np.concatenate([_FREE, _TURN.ravel()[None] / np.sqrt(6.0)]).r
 
 #: Name, standard deviation of the prior: how far from its nominal value a parameter may well be.
 _PRIOR: tuple[tuple[str, float], ...] = (
-    ("rest_length", 0.05),
-    ("chamber_offset", 0.2),
-    ("lengthening", 0.5),
-    ("softening", 0.5),
-    ("bending_compliance", 1.0),
-    ("axial_compliance", 0.2),
-    *((f"coupling_{number}", 0.2) for number in range(1, 8)),
+    ("rest_length", 0.1),
+    ("chamber_offset", 0.4),
+    ("lengthening", 0.7),
+    ("softening", 1.0),
+    ("bending_compliance", 2.0),
+    ("axial_compliance", 0.5),
+    *((f"coupling_{number}", 0.4) for number in range(1, 8)),
 )
 NAMES: tuple[str, ...] = (*(name for name, _ in _PRIOR), "hysteresis")
 PRIOR_SD: Array = np.array([sd for _, sd in _PRIOR] + [0.1])
-#: Below these a parameter has no meaning.
-LOWEST: Array = np.array([-0.5, -0.7, -0.8, 0.0, 0.0, 0.0, *[-1.0] * 7, 0.0])
+#: Between these a parameter has a meaning; a softening, a compliance and a loop may well be 0.
+LOWEST: Array = np.array([-3.5, -3.5, -4.5, 0.0, 0.0, 0.0, *[-2.0] * 7, 0.0])
+HIGHEST: Array = np.array([3.5, 3.5, 4.5, 20.0, 50.0, 50.0, *[2.0] * 7, 0.5])
 SHAPING = len(_PRIOR)  # parameters a section that enter the map; hysteresis comes before it
 
 
@@ -71,18 +73,20 @@ class SymbolicArm:
 def values_of(arm: Arm, index: int, theta: Any) -> dict[str, Any]:
     """Fields of section ``index`` at its scaled parameters ``theta``, numbers or symbols.
 
-    The scales: rest length and offset their own, the lengthening its own, the softening what
-    doubles the lengthening at full pressure, a compliance what a hanging section with the
-    weight of the whole arm loses of its bend, as a share, and gains in length, in tenths.
+    The scales: rest length, offset and lengthening the logarithm of their ratio to the nominal
+    ones, the softening what doubles the lengthening at full pressure, a compliance what a hanging
+    section with the weight of the whole arm loses of its bend, as a share, and gains in length,
+    in tenths.
     """
     section = arm.sections[index]
     full_pa = max(section.pressure_max_pa, -section.pressure_min_pa)
     weight_n = arm.mass_kg * max(float(np.linalg.norm(arm.gravity_m_s2)), 1e-9)
+    lengthening = section.lengthening_m_per_pa * ca.exp(theta[2])
     return {
-        "rest_length_m": section.rest_length_m * (1.0 + theta[0]),
-        "chamber_offset_m": section.chamber_offset_m * (1.0 + theta[1]),
-        "lengthening_m_per_pa": section.lengthening_m_per_pa * (1.0 + theta[2]),
-        "softening_m_per_pa2": section.lengthening_m_per_pa / full_pa * theta[3],
+        "rest_length_m": section.rest_length_m * ca.exp(theta[0]),
+        "chamber_offset_m": section.chamber_offset_m * ca.exp(theta[1]),
+        "lengthening_m_per_pa": lengthening,
+        "softening_m_per_pa2": lengthening / full_pa * theta[3],
         "bending_compliance_rad_per_n_m": 12.0 * theta[4] / (weight_n * section.rest_length_m),
         "axial_compliance_m_per_n": 0.2 * section.rest_length_m / weight_n * theta[5],
     }
@@ -92,7 +96,7 @@ def start_of(arm: Arm) -> Array:
     """Scaled parameters (n_sections, len(NAMES)) that say what the arm's own fields say."""
     start = np.zeros((arm.n_sections, len(NAMES)))
     for index, section in enumerate(arm.sections):
-        one = values_of(arm, index, np.ones(len(NAMES)))
+        one = values_of(arm, index, np.where(np.arange(len(NAMES)) < 3, 0.0, 1.0))
         start[index, 3] = section.softening_m_per_pa2 / one["softening_m_per_pa2"]
         start[index, 4] = section.bending_compliance_rad_per_n_m / one[_BENDING]
         start[index, 5] = section.axial_compliance_m_per_n / one["axial_compliance_m_per_n"]

@@ -17,6 +17,8 @@ LARGEST_SHARE = 0.7
 RAMP_S = 0.7
 REST_S = 0.95
 STEP_REST_S = 2.3
+#: A rest goes on until pressures and tip have settled, and at most so long (s).
+LONGEST_REST_S = 4.5
 
 #: Of the largest bend of a section: what one chamber alone, or two, may bend it.
 _BEND_SHARE = 0.75
@@ -24,9 +26,10 @@ _BEND_SHARE = 0.75
 
 @dataclass(frozen=True)
 class Move:
-    """Ramp to ``pressures_pa`` (n_sections, 3) in ``ramp_s``, smoothly; then rest for ``rest_s``.
+    """Ramp to ``pressures_pa`` (n_sections, 3) in ``ramp_s``, smoothly; then rest.
 
-    A ``ramp_s`` of 0 is a step: as fast as the arm's limits allow.
+    The rest lasts ``rest_s`` and, where valves are slow, until the arm has settled. A ``ramp_s`` of
+    0 is a step: as fast as the arm's limits allow.
     """
 
     pressures_pa: Array
@@ -35,8 +38,13 @@ class Move:
 
     @property
     def duration_s(self) -> float:
-        """Time of the whole move."""
+        """Time of the whole move, of an arm that settles in time."""
         return self.ramp_s + self.rest_s
+
+    @property
+    def longest_s(self) -> float:
+        """Time after which it is over, settled or not."""
+        return self.ramp_s + max(self.rest_s, LONGEST_REST_S)
 
     def at(self, start_pa: Array, elapsed_s: float) -> Array:
         """Pressures some time after the move began at ``start_pa``: a minimum-jerk ramp."""

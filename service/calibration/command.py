@@ -6,17 +6,28 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
 from pneuarm.controllers.calibration.plan import duration_s, plan
 from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.logs.view.pyplot import pyplot
-from pneuarm.service.calibration.drive import progress, record, require_tip
+from pneuarm.service.calibration import broken_off
+from pneuarm.service.calibration.drive import Progressed, ask, progress, record, require_tip
 from pneuarm.service.calibration.files import calibrated, require_folder, toml_text, write_whole
 from pneuarm.service.calibration.page import page
 from pneuarm.service.calibration.recordings import read_logs, require_seen
-from pneuarm.service.calibration.values import errors_mm, residuals_text, value_text, values
+from pneuarm.service.calibration.values import (
+    direction_deg,
+    errors_mm,
+    held_out_mm,
+    residuals_text,
+    value_text,
+    values,
+    worth_text,
+)
 from pneuarm.service.client.client import Client
-from pneuarm.service.configuration.configuration import Configuration, of_text
+from pneuarm.service.configuration.configuration import Configuration, recorded
 
 _TOML, _PAGE = "calibration.toml", "calibration.html"
 
@@ -34,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     text = toml_text(configuration, found)
     write_whole(folder / _PAGE, page(found))
     write_whole(folder / _TOML, text)
+    broken_off.remove(folder)
     _tell(arguments, found, folder)
     if found.fit.in_world and not arguments.json:
         frame = calibrated(configuration, found).frames.mocap_frame
@@ -44,26 +56,47 @@ def run(arguments: argparse.Namespace) -> int:
 def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
     name = arguments.arm or "paper"
     with Client(name, arguments.connect, "calibrate", arguments.zenoh_config) as client:
-        configuration = of_text(client.info().config_toml, "the daemon")
+        configuration = recorded(client.info().config_toml, "the daemon")
         arm = configuration.build_arm()
-        moves = plan(arm)
+        moves, folder = plan(arm), arguments.out
+        so_far = broken_off.load(folder, configuration) if arguments.resume else Progressed()
         require_tip(client)
+        left = moves[so_far.moves_done :]
         print(
-            f"arm {name} moves through {len(moves)} places in {duration_s(moves):.0f} s; keep its "
+            f"arm {name} moves through {len(left)} places in {duration_s(left):.0f} s; keep its "
             "workspace free; Ctrl-C ends it with the arm vented",
             file=sys.stderr,
             flush=True,
         )
-        recording = record(client, moves, arm.n_sections, progress())
+        try:
+            recording = record(client, moves, arm.n_sections, progress(), ask, so_far)
+        except BaseException:
+            _keep(folder, configuration, so_far, len(moves))
+            raise
     require_seen(recording)
     return configuration, recording
+
+
+def _keep(
+    folder: Path, configuration: Configuration, so_far: Progressed, number_of_moves: int
+) -> None:
+    """Keep what was recorded of a motion that ends early, and say how to go on with it."""
+    if not so_far.moves_done:
+        return
+    broken_off.save(folder, configuration, so_far)
+    print(
+        f"{so_far.moves_done} of {number_of_moves} moves are kept in {folder / broken_off.NAME}; "
+        f"go on with them: pneuarm calibrate --resume --out {folder}",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def _tell(arguments: argparse.Namespace, found: Calibration, folder: Path) -> None:
     if arguments.json:
         print(json.dumps(report(found, folder)))
         return
-    print(f"{residuals_text(found)}.")
+    print(f"{residuals_text(found)}.\n{worth_text(found)}.")
     for value in values(found):
         print(f"  {value_text(value)}")
     if found.note:
@@ -80,6 +113,15 @@ def report(found: Calibration, folder: Path) -> dict[str, Any]:
         "rests": len(after),
         "error_before_mm": {"mean": before.mean(), "max": before.max()},
         "error_after_mm": {"mean": after.mean(), "max": after.max()},
+        "held_out_mm": {
+            "mean": float(np.nanmean(held_out_mm(found))),
+            "max": float(np.nanmax(held_out_mm(found))),
+        },
+        "direction_deg": {
+            "before": direction_deg(found.fit.direction_before_rad),
+            "after": direction_deg(found.fit.direction_rad),
+            "held_out": direction_deg(found.fit.held_out_rad),
+        },
         "parameters": [vars(value) for value in values(found)],
         "coupling": [section.coupling for section in found.arm.sections],
         "rotation_base_to_measuring": frames.rotation.tolist(),

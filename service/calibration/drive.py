@@ -1,15 +1,34 @@
-"""The motion of a calibration, sent by a client, and the states that come back."""
+"""The motion of a calibration, sent by a client, and the states that come back.
+
+What interrupts it (a hold, a fault, a stall, a tip out of sight) ends no calibration: the arm holds
+or is vented, the reason is told, and on the operator's word it is armed again, repeats the move it
+was in, and goes on. What was moved until then is kept for a later session.
+"""
 
 import contextlib
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
-from pneuarm.controllers.arm.errors import CalibrationError, ModeRefused, PneuarmError
+from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import (
+    CalibrationError,
+    LeaseRefused,
+    ModeRefused,
+    PneuarmError,
+)
 from pneuarm.controllers.calibration.plan import Move, duration_s
-from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.controllers.calibration.recording import (
+    AVERAGED_S,
+    Recording,
+    fresh_tips,
+    joined,
+    settled,
+)
 from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.printable import name_of
@@ -20,8 +39,16 @@ _REFRESH_S = 0.02
 _POLL_S = 0.002
 #: A tip pose older than this (s) means that nobody measures now.
 _LOST_S = 1.0
+#: Whether an arm has settled is looked at this often (s).
+_LOOK_S = 0.1
+#: A move that is repeated is approached in this time (s), from wherever the arm holds.
+_AGAIN_S = 2.0
+#: An arm that is armed at less (Pa) was vented.
+_HELD_PA = 3000.0
 
 Progress = Callable[[float, float], None]
+#: Asked whether to arm again, told why the arm stopped; False ends the motion.
+Word = Callable[[str], bool]
 
 
 def require_tip(client: Client) -> None:
@@ -38,57 +65,169 @@ def _measured(state: pb.ArmState) -> bool:
     return len(state.tip_measured_position_m) == 3 and state.tip_measured_age_s < _LOST_S
 
 
-def record(client: Client, moves: Sequence[Move], n_sections: int, tell: Progress) -> Recording:
-    """Arm, go through the moves, vent; return what was recorded on the way.
+@dataclass
+class Progressed:
+    """How far a motion has come: moves that are done, and what was recorded of all of them."""
 
-    Whatever ends it early, Ctrl-C too, leaves the arm holding, then vented. Raises ModeRefused
-    when the arm stops following, and CalibrationError when the tip is no longer measured.
+    moves_done: int = 0
+    pieces: list[Recording] = field(default_factory=list)
+
+    @property
+    def recording(self) -> Recording:
+        """Everything, one piece after the other."""
+        return joined(self.pieces)
+
+
+def record(
+    client: Client,
+    moves: Sequence[Move],
+    n_sections: int,
+    tell: Progress,
+    word: Word = lambda why: False,
+    so_far: Progressed | None = None,
+) -> Recording:
+    """Arm, go through the moves that are not done, vent; return what was recorded on the way.
+
+    ``so_far`` is what was done before, and is kept up to date whatever happens. An interruption is
+    told to ``word``, which says whether to arm again; where it does not, its error is raised.
+    Whatever ends it early, Ctrl-C too, leaves the arm holding, then vented.
     """
+    so_far = so_far or Progressed()
     client.enable()
     try:
-        states = _moved(client, moves, n_sections, tell)
+        while so_far.moves_done < len(moves):
+            try:
+                _go_on(client, moves, n_sections, tell, so_far)
+            except (ModeRefused, CalibrationError) as error:
+                _again(client, error, word)
     finally:
         with contextlib.suppress(PneuarmError):
             client.hold()
             client.vent()
-    return recording_of(ticks_from_states(states, n_sections))
+    return so_far.recording
 
 
-def _moved(
-    client: Client, moves: Sequence[Move], n_sections: int, tell: Progress
-) -> list[pb.ArmState]:
+def _again(client: Client, error: PneuarmError, word: Word) -> None:
+    """Hold, ask, and arm again; raises the error where the word is not given."""
+    with contextlib.suppress(PneuarmError):
+        client.hold()
+    if isinstance(error, LeaseRefused) or not word(str(error)):
+        raise error
+    while True:
+        try:
+            if client.state().mode in (pb.FAULT, pb.ESTOP):
+                client.reset()
+            client.enable()
+            require_tip(client)
+        except (ModeRefused, CalibrationError) as still:
+            if isinstance(still, LeaseRefused) or not word(str(still)):
+                raise
+            continue
+        return
+
+
+def _go_on(
+    client: Client, moves: Sequence[Move], n_sections: int, tell: Progress, so_far: Progressed
+) -> None:
+    """Go through the moves that are left; what was recorded is kept, however it ends."""
     states = [client.state()]
-    whole_s, start = duration_s(list(moves)), np.zeros((n_sections, 3))
-    began_s = move_s = sent_s = time.monotonic()
+    start = np.array(states[0].pressure_sent_pa).reshape(n_sections, 3)
     client.events()
-    for move in moves:
-        while (now_s := time.monotonic()) < move_s + move.duration_s:
-            if now_s >= sent_s:
-                pressures = move.at(start, now_s - move_s)
-                client.send_pressures(pressures.reshape(-1).tolist())
-                client.raise_if_refused()
-                sent_s = now_s + _REFRESH_S
-            state = client.state()
-            if state.sequence != states[-1].sequence:
-                _require_going_on(state)
-                states.append(state)
-            tell(now_s - began_s, whole_s)
-            time.sleep(_POLL_S)
-        start, move_s = move.pressures_pa, move_s + move.duration_s
-    return states
+    whole_s = duration_s(list(moves))
+    repeated = bool(np.abs(start).max() > _HELD_PA)
+    try:
+        for number in range(so_far.moves_done, len(moves)):
+            move = moves[number]
+            if repeated:  # it holds somewhere: no step from there
+                move = Move(move.pressures_pa, max(move.ramp_s, _AGAIN_S), move.rest_s)
+                repeated = False
+            done_s = duration_s(list(moves[:number]))
+            _follow(client, move, start, states, partial(_tell_on, tell, done_s, whole_s))
+            start, so_far.moves_done = move.pressures_pa, number + 1
+    finally:
+        if len(states) > 1:
+            so_far.pieces.append(recording_of(ticks_from_states(states, n_sections)))
 
 
-def _require_going_on(state: pb.ArmState) -> None:
+def _tell_on(tell: Progress, done_s: float, whole_s: float, elapsed_s: float) -> None:
+    tell(done_s + elapsed_s, whole_s)
+
+
+def _follow(
+    client: Client,
+    move: Move,
+    start: Array,
+    states: list[pb.ArmState],
+    tell: Callable[[float], None],
+) -> None:
+    """Send one move until it is over; its states are appended."""
+    began_s = sent_s = looked_s = time.monotonic()
+    while True:
+        now_s = time.monotonic()
+        elapsed_s = now_s - began_s
+        if elapsed_s >= move.longest_s:
+            return
+        if elapsed_s >= move.duration_s and now_s >= looked_s:
+            if _settled(states):
+                return
+            looked_s = now_s + _LOOK_S
+        if now_s >= sent_s:
+            # A target that is refused goes stale, and the arm holds: its event says why.
+            client.send_pressures(move.at(start, elapsed_s).reshape(-1).tolist())
+            sent_s = now_s + _REFRESH_S
+        state = client.state()
+        if state.sequence != states[-1].sequence:
+            _require_going_on(client, state)
+            states.append(state)
+        tell(min(elapsed_s, move.duration_s))
+        time.sleep(_POLL_S)
+
+
+def _settled(states: list[pb.ArmState]) -> bool:
+    """Whether the newest states show an arm at rest."""
+    ends_ns = states[-1].time_unix_ns - int(2.1e9 * AVERAGED_S)
+    tail = [state for state in states[-200:] if state.time_unix_ns > ends_ns]
+    ticks = ticks_from_states(tail, tail[-1].n_sections)
+    time_s = (ticks["time_unix_ns"] - ticks["time_unix_ns"][0]) * 1e-9
+    tips = fresh_tips(ticks["tip_measured_position_m"], ticks["tip_measured_age_s"])
+    return settled(time_s, ticks["pressure_measured_pa"], tips)
+
+
+def _require_going_on(client: Client, state: pb.ArmState) -> None:
     if state.mode != pb.ACTIVE:
         mode = name_of(pb.Mode, state.mode)
         raise ModeRefused(
-            f"the arm went to mode {mode} in the middle of the calibration; nothing was written"
+            f"the arm went to mode {mode} in the middle of the calibration"
+            f"{_cause(client, state.mode)}"
         )
     if not _measured(state):
         raise CalibrationError(
-            "the tip was not measured any more in the middle of the calibration; nothing was "
-            "written: see that the marker stays in view, and calibrate again"
+            "the tip was not measured any more in the middle of the calibration: see that the "
+            "marker stays in view"
         )
+
+
+def _cause(client: Client, mode: "pb.Mode") -> str:
+    """What the daemon said of the change of mode: fault, cause and remedy."""
+    time.sleep(0.1)  # an event may come after the state that shows its effect
+    told = client.events()
+    if not told:
+        return ""
+    # The first of the gravest among those of that mode: what changed it.
+    event = max(told, key=lambda event: (event.mode == mode, event.level))
+    said = "; ".join(part for part in (event.text, event.cause, event.remedy) if part)
+    return f" ({event.code}: {said})"
+
+
+def ask(why: str) -> bool:
+    """Tell the operator why the arm stopped, and wait for the word; nobody there is a no."""
+    print(f"\ncalibrate: {why}", file=sys.stderr)
+    print(
+        "press Enter to arm again, repeat this move and go on; Ctrl-C ends it here",
+        file=sys.stderr,
+        flush=True,
+    )
+    return sys.stdin.readline() != ""
 
 
 def progress() -> Progress:
@@ -99,7 +238,7 @@ def progress() -> Progress:
         nonlocal shown
         on_terminal = sys.stderr.isatty()
         steps = 200 if on_terminal else 10
-        step = min(steps, int(steps * elapsed_s / whole_s))
+        step = min(steps, int(steps * elapsed_s / whole_s + 1e-9))
         if step == shown:
             return
         shown = step

@@ -15,7 +15,7 @@ from pneuarm.controllers.geometry.mountings import Transform
 from pneuarm.controllers.geometry.rotations import rotation_vector
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.tables.table import BAR, DEG, MM
-from pneuarm.service.calibration.values import residuals_text, value_text, values
+from pneuarm.service.calibration.values import residuals_text, value_text, values, worth_text
 from pneuarm.service.configuration.configuration import Configuration, check
 from pneuarm.service.configuration.tables.frames import FramesConfig
 
@@ -95,6 +95,8 @@ def toml_text(configuration: Configuration, calibration: Calibration) -> str:
     when = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     lines = [
         f"Calibration of arm {configuration.arm.name}, {when}: {residuals_text(calibration)}.",
+        f"Worth: {worth_text(calibration)}.",
+        *([f"Note: {calibration.note}."] if calibration.note else []),
         "Run it with `pneuarm run calibration.toml`. Fitted, with standard deviations:",
         *(f"  {value_text(value)}" for value in values(calibration)),
     ]
@@ -108,12 +110,12 @@ def require_folder(folder: Path) -> None:
     (folder / ".calibration").unlink()
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file that is there whole or not at all; raises ConfigurationError."""
     beside = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_text(text)
+        beside.write_bytes(content.encode() if isinstance(content, str) else content)
         os.replace(beside, path)
     except OSError as error:
         raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error

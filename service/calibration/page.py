@@ -8,7 +8,13 @@ import numpy as np
 
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.service.calibration.pictures import pictures
-from pneuarm.service.calibration.values import Value, coupling_deviations, residuals_text, values
+from pneuarm.service.calibration.values import (
+    Value,
+    coupling_deviations,
+    residuals_text,
+    values,
+    worth_text,
+)
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 72em; padding: 0 1em;
@@ -32,7 +38,8 @@ def page(calibration: Calibration) -> str:
 <html lang="en"><head><meta charset="utf-8"><title>Calibration of {name}</title>
 <style>{_STYLE}</style></head><body>
 <h1>Calibration of arm {name}</h1>
-<p>{when}. {sentence[0].upper()}{html.escape(sentence[1:])}.</p>{note}
+<p>{when}. {sentence[0].upper()}{html.escape(sentence[1:])}.</p>
+<p>Worth: {html.escape(worth_text(calibration))}.</p>{note}
 <h2>Parameters</h2>
 {_parameters(values(calibration))}
 <h2>Coupling</h2>

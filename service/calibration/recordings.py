@@ -7,9 +7,10 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import CalibrationError, ConfigurationError, LogError
-from pneuarm.controllers.calibration.recording import Recording, fresh_tips
+from pneuarm.controllers.calibration.recording import Recording, fresh_tips, joined
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.logs.reading.reader import LogReader
-from pneuarm.service.configuration.configuration import Configuration, of_text
+from pneuarm.service.configuration.configuration import Configuration, recorded
 
 #: What is needed of a tick; all of them, of hours, would fill the memory.
 _NEEDED = (
@@ -39,20 +40,10 @@ def recording_of(ticks: np.ndarray) -> Recording:
         times = np.maximum.accumulate(time_s[seen] - age_s[seen])
         columns = [np.interp(time_s, times, column) for column in tips[seen].T]
         tips = np.where(seen[:, None], np.stack(columns, axis=1), np.nan)
-    return Recording(time_s, ticks["pressure_sent_pa"], ticks["pressure_measured_pa"], tips)
-
-
-def joined(recordings: Sequence[Recording]) -> Recording:
-    """Recordings one after the other, a sample apart."""
-    times, end_s = [], 0.0
-    for recording in recordings:
-        times.append(recording.time_s - recording.time_s[0] + end_s)
-        end_s = times[-1][-1] + SAMPLE_S
+    turned = ticks["tip_measured_orientation_xyzw"]
+    rotations = np.moveaxis(rotation_from_quaternion(turned.T), -1, 0)
     return Recording(
-        np.concatenate(times),
-        np.concatenate([recording.sent_pa for recording in recordings]),
-        np.concatenate([recording.measured_pa for recording in recordings]),
-        np.concatenate([recording.tip_m for recording in recordings]),
+        time_s, ticks["pressure_sent_pa"], ticks["pressure_measured_pa"], tips, rotations
     )
 
 
@@ -81,7 +72,7 @@ def read_logs(paths: Sequence[Path], name: str | None) -> tuple[Configuration, R
 def _configuration(reader: LogReader) -> Configuration:
     path = reader.parts[0]
     try:
-        configuration = of_text(reader.info.config_toml, str(path))
+        configuration = recorded(reader.info.config_toml, str(path))
     except ConfigurationError as error:
         raise LogError(f"{path} holds a configuration that is not read here: {error}") from error
     if len(configuration.arm.sections) != reader.n_sections:

@@ -10,10 +10,13 @@ import time
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.calibrate import calibrate
-from pneuarm.controllers.calibration.plan import duration_s, plan
-from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.controllers.calibration.plan import Move, duration_s, plan
+from pneuarm.controllers.calibration.recording import Recording, settled
+from pneuarm.controllers.geometry.rotations import rotation_from_quaternion, rotation_from_vector
 from pneuarm.controllers.targets.targets import PressuresTarget
+from pneuarm.hardware.interface import Hardware
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
@@ -29,7 +32,9 @@ from pneuarm.service.processes.pipe import Command, Heartbeat, RequestMode, SetT
 _PERIOD_NS = 4_000_000
 _SAMPLE_TICKS = 3
 _REFRESH_TICKS = 5
-_NOISE_M = 1e-4
+_NOISE_M, _NOISE_RAD = 1e-4, 2e-3
+#: Samples that are looked at to see whether the arm has settled.
+_TAIL = 75
 _READY_TICKS = 1000
 _FOREVER = Timeouts(target_s=1.0, arming_s=1e6, hold_s=1e6, full_disk_vent_s=1e6)
 
@@ -37,21 +42,21 @@ _FOREVER = Timeouts(target_s=1.0, arming_s=1e6, hold_s=1e6, full_disk_vent_s=1e6
 class _Run:
     """The loop of a simulated arm, one tick after another."""
 
-    def __init__(self, configuration: Configuration) -> None:
-        self.arm = configuration.build_arm()
-        device = backends.build(configuration, self.arm)
+    def __init__(self, configuration: Configuration, device: Hardware) -> None:
+        self.arm, self.why = configuration.build_arm(), ""
         device.connect()
         control = configuration.control.model_copy(update={"rate_hz": 1e9 / _PERIOD_NS})
         slower = configuration.model_copy(update={"control": control})
         settings = LoopSettings.of(slower, _FOREVER, 0, time.time_ns())
-        self._loop = Loop(self.arm, settings, device, self._ignore)
+        self._loop = Loop(self.arm, settings, device, self._keep)
         self._loop.warm_up()
         self._dtype = tick_dtype(self.arm.n_sections)
         self.now_ns = self.ticks = 0
 
-    @staticmethod
-    def _ignore(event: pb.Event) -> None:
-        """Nobody reads the events of a run that is only counted."""
+    def _keep(self, event: pb.Event) -> None:
+        """Keep what was said last of something wrong."""
+        if event.level == pb.ERROR or not self.why:
+            self.why = event.text
 
     def tick(self, *commands: Command) -> np.void:
         self.now_ns += _PERIOD_NS
@@ -79,24 +84,51 @@ class _Run:
 
 def calibrate_simulated(configuration: Configuration) -> Configuration:
     """Calibrate the arm that a configuration simulates; return it with the fitted values."""
-    run = _Run(configuration)
+    recording = record_simulated(configuration)
+    return calibrated(configuration, calibrate(configuration.build_arm(), recording))
+
+
+def record_simulated(configuration: Configuration, device: Hardware | None = None) -> Recording:
+    """Go through the plan of a calibration with a simulated arm, and return what was recorded.
+
+    ``device`` stands in the place of the configuration's. Raises CalibrationError when the arm
+    stops following.
+    """
+    run = _Run(configuration, device or backends.build(configuration, configuration.build_arm()))
     run.activate()
-    return calibrated(configuration, calibrate(run.arm, _record(run)))
-
-
-def _record(run: _Run) -> Recording:
-    rng, rows = np.random.default_rng(0), []
+    rng, rows = np.random.default_rng(0), list[Sample]()
     moves, start = plan(run.arm), np.zeros((run.arm.n_sections, 3))
-    tell, whole_s, begun_ns = progress(), duration_s(moves), run.now_ns
+    tell, whole_s, done_s = progress(), duration_s(moves), 0.0
     for move in moves:
-        move_ns = run.now_ns
-        while (elapsed_s := 1e-9 * (run.now_ns - move_ns)) < move.duration_s:
-            tick = run.follow(move.at(start, elapsed_s))
+        begun_ns, first = run.now_ns, len(rows)
+        while not _over(move, 1e-9 * (run.now_ns - begun_ns), rows[first:][-_TAIL:]):
+            tick = run.follow(move.at(start, 1e-9 * (run.now_ns - begun_ns)))
             if run.ticks % _SAMPLE_TICKS == 0:
-                tip = tick["tip_true_position_m"] + rng.normal(0.0, _NOISE_M, 3)
-                sent, measured = tick["pressure_sent_pa"], tick["pressure_measured_pa"]
-                rows.append((1e-9 * run.now_ns, sent, measured, tip))
+                rows.append(_sample(run, tick, rng))
+        done_s += move.duration_s
         if sys.stderr.isatty():
-            tell(1e-9 * (run.now_ns - begun_ns), whole_s)
+            tell(done_s, whole_s)
         start = move.pressures_pa
     return Recording(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+#: Time, pressures sent and measured, tip position and rotation.
+Sample = tuple[float, Array, Array, Array, Array]
+
+
+def _sample(run: _Run, tick: np.void, rng: np.random.Generator) -> Sample:
+    if tick["mode"] != pb.ACTIVE:
+        mode = pb.Mode.Name(int(tick["mode"])).lower()
+        raise CalibrationError(f"the simulated arm went to mode {mode}: {run.why}")
+    tip = tick["tip_true_position_m"] + rng.normal(0.0, _NOISE_M, 3)
+    rotation = rotation_from_quaternion(tick["tip_true_orientation_xyzw"])
+    rotation = rotation_from_vector(rng.normal(0.0, _NOISE_RAD, 3)) @ rotation
+    sent, measured = tick["pressure_sent_pa"], tick["pressure_measured_pa"]
+    return 1e-9 * run.now_ns, sent, measured, tip, rotation
+
+
+def _over(move: Move, elapsed_s: float, tail: list[Sample]) -> bool:
+    if elapsed_s < move.duration_s:
+        return False
+    time_s, _, measured, tip, _ = (np.array(column) for column in zip(*tail, strict=True))
+    return elapsed_s >= move.longest_s or settled(time_s, measured, tip)

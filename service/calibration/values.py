@@ -78,7 +78,10 @@ def values(calibration: Calibration) -> list[Value]:
 def _deviations(calibration: Calibration, index: int) -> dict[str, float]:
     """Standard deviation of every field of a section, SI."""
     before, sd = calibration.before, calibration.fit.sd[index]
-    here, there = values_of(before, index, 0.0 * sd), values_of(before, index, sd)
+    theta = calibration.fit.theta[index]
+    here, there = values_of(before, index, theta), values_of(before, index, theta + sd)
+    softer = values_of(before, index, theta + np.where(np.arange(len(sd)) == 3, sd, 0.0))
+    there["softening_m_per_pa2"] = softer["softening_m_per_pa2"]
     found = {name: float(there[name] - here[name]) for name in here}
     found["hysteresis_pa"] = float(sd[NAMES.index("hysteresis")]) * span_pa(before.sections[index])
     return found
@@ -98,6 +101,38 @@ def errors_mm(calibration: Calibration) -> tuple[Array, Array]:
         np.linalg.norm(tips - fit.measured_m, axis=1) / MM for tips in (fit.before_m, fit.after_m)
     )
     return before, after
+
+
+def held_out_mm(calibration: Calibration) -> Array:
+    """Errors (rests,) of fits that did not see the rest they are judged at, mm."""
+    return calibration.fit.held_out_m / MM
+
+
+def direction_deg(angles_rad: Array) -> float | None:
+    """Median (degrees) of angles between directions, None where no direction was measured."""
+    seen = angles_rad[np.isfinite(angles_rad)]
+    return float(np.rad2deg(np.median(seen))) if len(seen) else None
+
+
+def worth_text(calibration: Calibration) -> str:
+    """Say in one sentence what the fit is worth at places that it did not see."""
+    held_out = held_out_mm(calibration)
+    percent = 100.0 * np.nanmean(held_out) * MM / calibration.arm.total_rest_length_m
+    sentence = (
+        f"at rests that no fit had seen the tip is {np.nanmean(held_out):.2f} mm off on average "
+        f"({percent:.2f} % of the arm's length), at most {np.nanmax(held_out):.1f} mm"
+    )
+    direction = direction_deg(calibration.fit.held_out_rad)
+    if direction is None:
+        return f"{sentence}; its direction was not measured"
+    turned = float(np.rad2deg(np.arccos(np.clip(calibration.fit.frames.axis[2], -1.0, 1.0))))
+    sentence += f", and points {direction:.1f} degrees elsewhere in the median"
+    if turned > 1.0:
+        sentence += (
+            f" when the marker is taken to sit turned by {turned:.0f} degrees on the tip (see "
+            "tip_in_marker_rotation_deg)"
+        )
+    return sentence
 
 
 def residuals_text(calibration: Calibration) -> str:

@@ -310,6 +310,9 @@ def _add_calibrate(commands: Subparsers) -> None:
         "--from", dest="from_logs", nargs="+", type=Path, metavar="LOG", help="recorded sessions"
     )
     calibrate.add_argument(
+        "--resume", action="store_true", help="go on with the motion that was broken off in --out"
+    )
+    calibrate.add_argument(
         "--world", action="store_true", help="poses are of a marker, in a frame not the base's"
     )
 

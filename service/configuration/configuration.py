@@ -31,7 +31,7 @@ from pneuarm.service.configuration.tables.control import ControlConfig
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig, ReferenceConfig
 from pneuarm.service.configuration.tables.frames import FramesConfig
 from pneuarm.service.configuration.tables.hardware import HardwareConfig
-from pneuarm.service.configuration.tables.monitors import MonitorsConfig
+from pneuarm.service.configuration.tables.monitors import MOVED, MonitorsConfig, moved
 from pneuarm.service.configuration.tables.outputs import LogConfig, RerunConfig, ZenohConfig
 from pneuarm.service.configuration.text_file import read_text
 from pneuarm.service.network.endpoint import Endpoint, in_url
@@ -192,9 +192,12 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
     return configuration
 
 
-def of_text(text: str, where: str) -> Configuration:
-    """Check a whole configuration, as a log or a daemon has it; raises ConfigurationError."""
-    return check(_tables(text, where), where)
+def recorded(toml: str, where: str) -> Configuration:
+    """Check the configuration of a session, maybe of before a key moved; ConfigurationError."""
+    tables = _tables(toml, where)
+    if isinstance(tables.get("monitors"), dict):
+        tables["monitors"] = moved(tables["monitors"])
+    return check(tables, where)
 
 
 def _read(path: Path, where: str) -> dict[str, Any]:
@@ -230,6 +233,9 @@ def _sentence(item: Any) -> str:
         for broken in devices().broken.values():
             if item["loc"] == (broken.name.replace("-", "_"),):
                 return f"{key}: {broken}"
+        table, _, name = key.partition(".")
+        if table == "monitors" and name in MOVED:
+            return f"{key}: no such key; it has moved to monitors.{MOVED[name]}"
         return f"{key}: no such key; allowed here: {', '.join(_keys_beside(item['loc']))}"
     if item["type"] == "missing":
         return f"{key} is missing"

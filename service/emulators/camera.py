@@ -26,7 +26,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
 from pneuarm.logs.schema.topics import STATE, TIP_POSE, full_key
 from pneuarm.service.client.client import Client
-from pneuarm.service.configuration.configuration import Configuration, of_text
+from pneuarm.service.configuration.configuration import Configuration, recorded
 from pneuarm.service.network import sessions as network
 from pneuarm.service.wire.tip_pose_source import read_key, signature
 
@@ -107,7 +107,7 @@ def emulate_camera(arguments: argparse.Namespace) -> int:
 def _configuration(arguments: argparse.Namespace) -> Configuration:
     """Ask the daemon where motion capture, marker and tool are, and under which name to publish."""
     with Client(arguments.arm, arguments.connect, "camera") as client:
-        return of_text(client.info().config_toml, "the daemon")
+        return recorded(client.info().config_toml, "the daemon")
 
 
 def _publish(

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pneuarm.controllers.arm.errors import LogError
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.summary import LogSummary, summarise
-from pneuarm.service.configuration.configuration import Configuration, of_text
+from pneuarm.service.configuration.configuration import Configuration, recorded
 
 #: Places that are named; there may be thousands.
 _DAMAGE_LINES = 20
@@ -22,7 +22,7 @@ def recorded_configuration(reader: LogReader) -> Configuration:
             f"{path} lacks the configuration with which it was recorded: every copy in it is "
             "damaged; its ticks can be read, and replayed with --to zenoh"
         )
-    configuration = of_text(reader.info.config_toml, str(path))
+    configuration = recorded(reader.info.config_toml, str(path))
     sections = len(configuration.arm.sections)
     if sections != reader.n_sections:
         raise LogError(

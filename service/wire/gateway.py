@@ -59,7 +59,7 @@ _ORPHAN_S = 3.0
 _REPEAT_STOP_S = 0.02
 
 #: Requests for one action in a second: from who proves to hold the lease, and from all others.
-_REQUESTS_PER_S = 20.0
+_REQUESTS_PER_S = 100.0
 
 #: Queries that wait for control's answer, or to be read; the newest requests are kept.
 _WAITING = 256

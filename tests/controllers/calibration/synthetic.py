@@ -12,11 +12,11 @@ from pneuarm.controllers.calibration.plan import Move, plan
 from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
 from tools.rig.arms import paper_arm, table1_arm
+from tools.rig.foreign_arms import sent_by
 
 SAMPLE_S = 0.01
 #: Where nothing swings, so many samples are enough.
 COARSE_S = 0.05
-STEP_PA_S = 2e5
 
 
 def other_arm(arm: Arm) -> Arm:
@@ -38,18 +38,6 @@ def other_arm(arm: Arm) -> Arm:
     return replace(arm, sections=sections, response=Response(0.02, 0.09, 1.7, 0.2))
 
 
-def sent_by(moves: Sequence[Move], n_sections: int, sample_s: float = SAMPLE_S) -> Array:
-    """Pressures (samples, n_sections, 3) of a plan; a step rises by 2 bar/s."""
-    start, rows = np.zeros((n_sections, 3)), []
-    for move in moves:
-        ramp_s = move.ramp_s or float(np.abs(move.pressures_pa - start).max()) / STEP_PA_S
-        ramped = Move(move.pressures_pa, max(ramp_s, sample_s), move.rest_s)
-        times = np.arange(0.0, ramped.duration_s, sample_s)
-        rows += [ramped.at(start, float(time_s)) for time_s in times]
-        start = move.pressures_pa
-    return np.array(rows)
-
-
 def quiet(arm: Arm, moves: Sequence[Move]) -> Recording:
     """What would be recorded of an arm whose valves do not lag and whose tip does not swing."""
     sent_pa = sent_by(moves, arm.n_sections, COARSE_S)
@@ -69,12 +57,13 @@ def recording_of(
     near = None
     for index, pressures in enumerate(acting):
         near = lengths[index] = pressure_map.lengths_m(pressures, near)
-    tips = np.array([tip_transform(arm, row)[:3, 3] for row in lengths])
+    transforms = np.array([tip_transform(arm, row) for row in lengths])
+    tips, rotations = transforms[:, :3, 3], transforms[:, :3, :3]
     if swings:
         tips = swung(tips, response)
     noise = rng.normal(0.0, 1.0, tips.shape)
     measured = lagged + 100.0 * rng.normal(0.0, 1.0, sent_pa.shape)
-    return Recording(time_s, sent_pa, measured, tips + 1e-5 * noise)
+    return Recording(time_s, sent_pa, measured, tips + 1e-5 * noise, rotations)
 
 
 def delayed_and_lagged(sent_pa: Array, response: Response, finer: int = 20) -> Array:

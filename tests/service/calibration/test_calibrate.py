@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,12 +29,12 @@ from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
 from pneuarm.logs.schema.topics import TIP_POSE, full_key
+from pneuarm.service.calibration import broken_off, drive
 from pneuarm.service.calibration import command as commands_calibrate
-from pneuarm.service.calibration import drive
 from pneuarm.service.calibration.drive import progress, require_tip
 from pneuarm.service.calibration.files import write_whole
 from pneuarm.service.calibration.recordings import recording_of, require_seen
-from pneuarm.service.configuration.configuration import load
+from pneuarm.service.configuration.configuration import check, load
 from tools.rig.daemon import Daemon, assert_one_sentence, run_command
 
 pytestmark = pytest.mark.slow
@@ -97,6 +98,7 @@ def arguments(folder: Path, daemon: Daemon, **changed: Any) -> argparse.Namespac
         "out": folder,
         "from_logs": None,
         "world": False,
+        "resume": False,
     }
     return argparse.Namespace(**(given | changed))
 
@@ -116,6 +118,7 @@ def test_an_arm_is_calibrated_and_the_daemon_takes_the_result(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(commands_calibrate, "plan", few_moves)
+    monkeypatch.setattr(commands_calibrate, "ask", lambda why: True)  # a busy machine stalls
     with Camera(daemon):
         time.sleep(0.3)
         assert commands_calibrate.run(arguments(tmp_path / "live", daemon)) == 0
@@ -174,17 +177,62 @@ def test_ctrl_c_leaves_the_arm_vented_and_no_file(daemon: Daemon, tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_stop_in_the_middle_ends_it(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_stop_in_the_middle_ends_it_without_the_word(daemon: Daemon) -> None:
+    asked: list[str] = []
+
     def stop(elapsed_s: float, whole_s: float) -> None:
         if elapsed_s > 0.3:
             with daemon.client("other") as other:
                 other.hold()
 
+    def no(why: str) -> bool:
+        asked.append(why)
+        return False
+
     with Camera(daemon), daemon.client() as client:
         time.sleep(0.3)
-        with pytest.raises(ModeRefused, match=r"hold|rejected"):
-            drive.record(client, few_moves(load().build_arm()), 1, stop)
+        with pytest.raises(ModeRefused, match="mode hold"):
+            drive.record(client, few_moves(load().build_arm()), 1, stop, no)
         assert client.state().mode in (pb.IDLE, pb.READY)
+    assert len(asked) == 1
+
+
+def test_a_stall_holds_names_its_cause_and_goes_on_by_the_word(
+    daemon: Daemon, tmp_path: Path
+) -> None:
+    asked, stalled = list[str](), list[float]()
+    moves = few_moves(load().build_arm())[:3]
+
+    def stall(elapsed_s: float, whole_s: float) -> None:
+        if elapsed_s > 1.6 and not stalled:
+            stalled.append(elapsed_s)
+            time.sleep(5.5)  # beyond the target timeout of this daemon
+
+    def word(why: str) -> bool:
+        asked.append(why)
+        return True
+
+    so_far = drive.Progressed()
+    with Camera(daemon), daemon.client() as client:
+        time.sleep(0.3)
+        drive.record(client, moves, 1, stall, word, so_far)
+        configuration = check(tomllib.loads(client.info().config_toml))
+    assert any("target_stale" in why for why in asked), asked
+    assert so_far.moves_done == len(moves)
+    assert len(so_far.pieces) >= 2
+    # What was kept goes on where it was, and only with the same arm.
+    broken_off.save(tmp_path, configuration, so_far)
+    again = broken_off.load(tmp_path, configuration)
+    assert again.moves_done == len(moves)
+    np.testing.assert_array_equal(again.recording.sent_pa, so_far.recording.sent_pa)
+    with pytest.raises(CalibrationError, match="another"):
+        broken_off.load(tmp_path, load(preset="table1"))
+    (tmp_path / broken_off.NAME).write_bytes(b"no archive")
+    with pytest.raises(CalibrationError, match="damaged"):
+        broken_off.load(tmp_path, configuration)
+    broken_off.remove(tmp_path)
+    with pytest.raises(CalibrationError, match="--resume"):
+        broken_off.load(tmp_path, configuration)
 
 
 def state_at(age_s: float, tip: tuple[float, ...] = (0.0, 0.0, 0.2)) -> pb.ArmState:

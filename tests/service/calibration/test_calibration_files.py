@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.controllers.calibration.frames import Frames, rotation_of
+from pneuarm.controllers.calibration.frames import Frames
 from pneuarm.controllers.geometry.mountings import Transform
+from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from pneuarm.service.calibration.files import MOCAP_FRAME, frames_table
 from pneuarm.service.configuration.tables.frames import FramesConfig
 
-TIP = Transform(rotation_of(np.array([0.2, -0.4, 0.1])), np.array([0.03, -0.02, 0.19]))
-WORLD = Transform(rotation_of(np.array([0.3, -0.8, 1.9])), np.array([0.5, -0.2, 1.1]))
+TIP = Transform(rotation_from_vector(np.array([0.2, -0.4, 0.1])), np.array([0.03, -0.02, 0.19]))
+WORLD = Transform(rotation_from_vector(np.array([0.3, -0.8, 1.9])), np.array([0.5, -0.2, 1.1]))
 MARKER_M = np.array([0.0, 0.01, 0.02])
 ROUGH = FramesConfig(
     mocap_frame="hall",

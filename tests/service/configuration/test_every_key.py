@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from pneuarm.controllers.arm.errors import ConfigurationError
-from pneuarm.service.configuration.configuration import Configuration, check, load, of_text
+from pneuarm.service.configuration.configuration import Configuration, check, load, recorded
 
 Where = tuple[str | int, ...]
 
@@ -111,7 +111,7 @@ def test_a_value_is_refused_with_its_key_or_can_be_built_of(where: Where) -> Non
 )
 def test_what_a_file_may_say_is_refused_with_the_facts(text: str, facts: tuple[str, ...]) -> None:
     with pytest.raises(ConfigurationError) as refused:
-        of_text(text if "preset" in text else f'preset = "paper"\n{text}', "own.toml")
+        recorded(text if "preset" in text else f'preset = "paper"\n{text}', "own.toml")
     assert all(fact in str(refused.value) for fact in facts)
 
 
