@@ -81,6 +81,7 @@ def refusal(where: Where, value: object) -> str | None:
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", KEYS, ids=lambda where: ".".join(map(str, where)))
 def test_a_value_is_refused_with_its_key_or_can_be_built_of(where: Where) -> None:
     told = [(value, refusal(where, value)) for value in [*WRONG, *bounds(KEYS[where])]]
