@@ -4,7 +4,6 @@ It imports neither zenoh, rerun nor mcap, and waits for nobody but the clock.
 """
 
 import os
-import socket
 import time
 from multiprocessing.connection import Connection
 
@@ -20,6 +19,7 @@ from pneuarm.service.devices import registry as backends
 from pneuarm.service.modes.mode_keeper import Notice, Timeouts
 from pneuarm.service.processes import realtime
 from pneuarm.service.processes.device_slots import LinkedDevice
+from pneuarm.service.processes.lock import Lock
 from pneuarm.service.processes.pipe import Command, ModeReply, Pipe, Shutdown
 from pneuarm.service.processes.shared import REALTIME, START_FAILED, Shared, ignore_terminal_signals
 from pneuarm.service.processes.telling import Telling
@@ -168,8 +168,8 @@ def main(
     supervisor: Pipe,
     requests: Pipe,
     stream: Pipe,
-    arm_lock: socket.socket,
-    device_lock: socket.socket,
+    arm_lock: Lock,
+    device_lock: Lock,
     end: Connection,
 ) -> None:
     """Entry point of the process.

@@ -5,7 +5,6 @@ nothing at all, so that the device's own watchdog runs out if this was not enoug
 its own exchanges it does not go on either: meanwhile the device may have vented by itself.
 """
 
-import socket
 import time
 from multiprocessing.connection import Connection
 
@@ -23,6 +22,7 @@ from pneuarm.service.processes.device_slots import (
     LinkState,
     Order,
 )
+from pneuarm.service.processes.lock import Lock
 from pneuarm.service.processes.shared import Shared, ignore_terminal_signals, parent_is_alive
 
 #: Control's first commands, while it warms up, come in no order of time: until this many have come
@@ -197,9 +197,7 @@ class DeviceProcess:
             self._device.close()
 
 
-def main(
-    shared: Shared, arm_lock: socket.socket, device_lock: socket.socket, end: Connection
-) -> None:
+def main(shared: Shared, arm_lock: Lock, device_lock: Lock, end: Connection) -> None:
     """Entry point of the process; the locks are held here too, as in control."""
     ignore_terminal_signals()
     # Right below the loop: a command that waits for a processor gets old.

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from pneuarm.controllers.feedback.observer import FeedbackSettings
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
-from pneuarm.hardware.tables.table import MM, Positive, Table
+from pneuarm.hardware.tables.table import MM, PathText, Positive, Table
 
 _MBAR = 100.0
 
@@ -166,7 +166,7 @@ class FeedbackConfig(Table):
         ),
     ] = ""
     tip_pose_key_file: Annotated[
-        str,
+        PathText,
         Field(
             description="file with a secret of 16 bytes or more; each pose must then have the "
             "HMAC-SHA256 of its payload attached, and a stamp that increases; empty: no signature"
