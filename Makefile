@@ -46,7 +46,7 @@ test-slow: setup
 
 # Style, types, import contracts; what the client's distribution holds also as Python 3.10 sees it.
 CLIENT := pneuarm/__init__.py pneuarm/__main__.py \
-    $(addprefix pneuarm/, controllers/arm/errors.py logs/schema service/client service/network)
+    $(addprefix pneuarm/, controllers/arm/errors.py controllers/arm/names.py logs/schema service/client service/network)
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

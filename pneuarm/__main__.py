@@ -2,12 +2,20 @@
 
 import os
 import signal
+import sys
 from types import FrameType
 
 from pneuarm import __version__
 
+#: Also to be said where nothing else of pneuarm can be loaded.
+_STOPS = sys.argv[1:2] == ["estop"]
 
-def _on_ctrl_c(number: int, frame: FrameType | None) -> None:
+
+def _sentence(text: str) -> str:
+    return f"pneuarm: NOT CONFIRMED: {text}; cut the air supply" if _STOPS else f"pneuarm: {text}"
+
+
+def _on_signal(number: int, frame: FrameType | None) -> None:
     """End without a word while a command still loads; nothing has begun yet."""
     loading = None
     while frame is not None:
@@ -18,23 +26,51 @@ def _on_ctrl_c(number: int, frame: FrameType | None) -> None:
         __name__,
         "pneuarm.service.cli.parser",
     ):
+        if _STOPS:
+            os.write(2, f"{_sentence('it was interrupted before it began')}\n".encode())
         os._exit(130)
     raise KeyboardInterrupt
 
 
+def _take_signals() -> None:
+    """Ctrl-C is an exception; so is any other order to end a stop, whose failure must be told."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under `nohup`
+        signal.signal(signal.SIGINT, _on_signal)
+    for number in (signal.SIGTERM, signal.SIGHUP) if _STOPS else ():
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _on_signal)
+
+
+def _open_standard_streams() -> None:
+    """Give what was started without them streams that lead nowhere.
+
+    Else the next file that is opened would be one of them, and be written to.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+
+
+def _why_not_loaded(error: Exception) -> str:
+    if isinstance(error, ModuleNotFoundError) and error.name == "pneuarm.service.cli":
+        return (  # which the distribution of the client leaves out
+            "only the client is installed here, `from pneuarm import Client`; the daemon and the "
+            f"commands come with `pip install pneuarm=={__version__}`"
+        )
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"the command line cannot be loaded: {what}"
+
+
 def main() -> None:
     """Run the command line."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under `nohup`
-        signal.signal(signal.SIGINT, _on_ctrl_c)
+    _take_signals()
+    _open_standard_streams()
     try:
         from pneuarm.service.cli.parser import main as command
-    except ModuleNotFoundError as error:
-        if error.name != "pneuarm.service.cli":  # what the distribution of the client leaves out
-            raise
-        raise SystemExit(
-            "pneuarm: only the client is installed here, `from pneuarm import Client`; the daemon "
-            f"and the commands come with `pip install pneuarm=={__version__}`"
-        ) from None
+    except Exception as error:  # a machine that has run out of something, too
+        raise SystemExit(_sentence(_why_not_loaded(error))) from None
     raise SystemExit(command())
 
 

@@ -13,7 +13,7 @@ PneuarmError
 |-- ModeRefused             a mode change that is not allowed now
 |   `-- LeaseRefused        another client holds the arm
 |-- MoveTimeout             a target that was taken, and not reached in time
-|-- NotConfirmed            a stop that was sent, and whose effect was not seen
+|-- NotConfirmed            a stop whose effect was not seen: cut the air supply
 `-- DaemonUnreachable       nobody answers under that address
 """
 
@@ -75,7 +75,15 @@ class MoveTimeout(PneuarmError):
 
 
 class NotConfirmed(PneuarmError):
-    """A stop was sent and nothing showed that it acted: cut the air supply."""
+    """A stop of which nothing showed that it acted; ``why`` is the reason, without the remedy."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why)
+        self.why = why
+
+    def __str__(self) -> str:
+        """Say what to do, whatever the reason is."""
+        return f"NOT CONFIRMED: {self.why}; cut the air supply"
 
 
 class DaemonUnreachable(PneuarmError):

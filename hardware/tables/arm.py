@@ -14,6 +14,7 @@ from pneuarm.controllers.arm.arm import (
     Section,
     Sphere,
 )
+from pneuarm.controllers.arm.names import ARM_NAME
 from pneuarm.hardware.tables.table import (
     BAR,
     DEG,
@@ -211,7 +212,7 @@ class ArmConfig(Table):
     name: Annotated[
         str,
         Field(
-            pattern=r"^[a-z][a-z0-9_-]{0,31}$",
+            pattern=ARM_NAME,
             description=(
                 "the arm's name in all Zenoh keys and log files: lower case letters, digits, `_` "
                 "and `-`, a letter first, at most 32"
@@ -229,10 +230,8 @@ class ArmConfig(Table):
         ),
     ]
     body_radius_mm: Annotated[
-        float,
+        NotNegative,
         Field(
-            ge=0,
-            allow_inf_nan=False,
             description="how far the arm's skin is from the backbone; counts for `keep_outs` only",
         ),
     ] = 0.0

@@ -1,12 +1,28 @@
 """What every table of a configuration file is, and the kinds of number in it."""
 
+from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+# No quantity of an arm comes near these ends, and what is beyond them overflows in SI units.
+Positive = Annotated[float, Field(ge=1e-9, le=1e9, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
+
+
+def _known_home(text: str) -> str:
+    try:
+        Path(text).expanduser()
+    except RuntimeError as error:
+        raise ValueError(f"{text!r}: nobody of that name has a home folder here") from error
+    return text
+
+
+#: The path of a file or a folder; `~` is understood.
+PathText = Annotated[
+    str, Field(max_length=1024, pattern=r"^[^\x00-\x1f\x7f]*$"), AfterValidator(_known_home)
+]
 
 MM, BAR, DEG = 1e-3, 1e5, 0.017453292519943295
 

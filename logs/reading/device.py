@@ -9,7 +9,7 @@ from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.hardware.device import Address, Device, InMemory
 from pneuarm.hardware.interface import Hardware
-from pneuarm.hardware.tables.table import Table
+from pneuarm.hardware.tables.table import PathText, Table
 
 
 class ReplayConfig(Table):
@@ -19,7 +19,7 @@ class ReplayConfig(Table):
     """
 
     log: Annotated[
-        str,
+        PathText,
         Field(description="path of the session, its first part, `~` is understood; must be given"),
     ] = ""
 

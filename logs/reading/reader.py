@@ -25,7 +25,7 @@ from pneuarm.logs.reading.walk import (
     walk,
 )
 from pneuarm.logs.rings.rings import HOLD_S
-from pneuarm.logs.rings.tick import tick_dtype, ticks_from_states
+from pneuarm.logs.rings.tick import fits, tick_dtype, ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import INFO, STATE, Topic, split_key
 
@@ -101,6 +101,11 @@ class LogReader:
         message = _parsed(raw)
         if message is None:
             self._tell(Damage(self.parts[0], 0, 0, f"a message at {raw.topic.key} cannot be read"))
+        n_sections = len(self.info.bend_max_rad)
+        if isinstance(message, pb.ArmState) and n_sections and not fits(message, n_sections):
+            what = f"a state that is not of {n_sections} sections, as the arm of this log is"
+            self._tell(Damage(self.parts[0], 0, 0, what))
+            return None
         return message
 
     def raw(self) -> Iterator[Raw]:

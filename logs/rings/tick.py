@@ -109,6 +109,17 @@ def state_from_tick(tick: np.void | np.ndarray) -> ArmState:
     return state
 
 
+@cache
+def _sizes(n_sections: int) -> tuple[tuple[str, int], ...]:
+    blank = new_tick(n_sections)
+    return tuple((name, blank[name].size) for name in _ARRAYS)
+
+
+def fits(state: ArmState, n_sections: int) -> bool:
+    """Whether every array of a state is that of an arm with so many sections, or not known."""
+    return all(len(getattr(state, name)) in (0, size) for name, size in _sizes(n_sections))
+
+
 def ticks_from_states(states: list[ArmState], n_sections: int) -> np.ndarray:
     """Ticks, shape (len(states),), of messages of one arm."""
     ticks = np.zeros(len(states), dtype=tick_dtype(n_sections))

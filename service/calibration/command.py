@@ -3,7 +3,6 @@
 import argparse
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from pneuarm.service.calibration.values import (
     worth_text,
 )
 from pneuarm.service.client.client import Client
-from pneuarm.service.configuration.configuration import Configuration, check
+from pneuarm.service.configuration.configuration import Configuration, recorded
 
 _TOML, _PAGE = "calibration.toml", "calibration.html"
 
@@ -57,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
     name = arguments.arm or "paper"
     with Client(name, arguments.connect, "calibrate", arguments.zenoh_config) as client:
-        configuration = check(tomllib.loads(client.info().config_toml), "the daemon")
+        configuration = recorded(client.info().config_toml, "the daemon")
         arm = configuration.build_arm()
         moves, folder = plan(arm), arguments.out
         so_far = broken_off.load(folder, configuration) if arguments.resume else Progressed()

@@ -1,6 +1,5 @@
 """Ticks, live or from logs, as what a calibration is fitted to."""
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -73,9 +72,15 @@ def read_logs(paths: Sequence[Path], name: str | None) -> tuple[Configuration, R
 def _configuration(reader: LogReader) -> Configuration:
     path = reader.parts[0]
     try:
-        return recorded(reader.info.config_toml, str(path))
-    except (ConfigurationError, tomllib.TOMLDecodeError) as error:
+        configuration = recorded(reader.info.config_toml, str(path))
+    except ConfigurationError as error:
         raise LogError(f"{path} holds a configuration that is not read here: {error}") from error
+    if len(configuration.arm.sections) != reader.n_sections:
+        raise LogError(
+            f"{path} is damaged: its configuration is of {len(configuration.arm.sections)} "
+            f"sections, its facts are of {reader.n_sections}"
+        )
+    return configuration
 
 
 def _require_same(path: Path, arm: Arm, first: Arm, name: str | None) -> None:

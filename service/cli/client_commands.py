@@ -1,4 +1,4 @@
-"""`pneuarm send`, `enable`, `hold`, `vent`, `reset`, `estop` and `state`."""
+"""`pneuarm send`, `enable`, `hold`, `vent`, `reset` and `state`."""
 
 import argparse
 import json
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from google.protobuf import json_format
 from google.protobuf.message import Message
 
-from pneuarm.controllers.arm.errors import DaemonUnreachable, ModeRefused, NotConfirmed
+from pneuarm.controllers.arm.errors import ModeRefused
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.event_line import event_line
 from pneuarm.logs.schema.printable import name_of
@@ -22,7 +22,6 @@ from pneuarm.service.client.target_messages import (
     position_target,
     twist_target,
 )
-from pneuarm.service.daemon.local_stop import stop_locally
 
 _LAWS = {None: pb.DEFAULT, "resolved_rate": pb.RESOLVED_RATE, "qp_ik": pb.QP_IK}
 _REFRESH_S = 0.02
@@ -107,25 +106,6 @@ def mode(arguments: argparse.Namespace) -> int:
         }
         reply = actions[arguments.command]()
     _show(arguments, reply, f"mode is {name_of(pb.Mode, reply.mode)}")
-    return 0
-
-
-def estop(arguments: argparse.Namespace) -> int:
-    """Stop, past the network if the daemon runs on this machine, else through it."""
-    way = "on this machine"
-    try:
-        stop_locally(arguments.arm)
-    except (DaemonUnreachable, NotConfirmed) as local_error:
-        way = f"through {arguments.connect}"
-        try:
-            with _connect(arguments) as client:
-                client.estop()
-        except (DaemonUnreachable, NotConfirmed) as error:
-            raise NotConfirmed(
-                f"NOT CONFIRMED: {local_error}; {error}; cut the air supply"
-            ) from error
-    text = f"STOPPED: arm {arguments.arm} vents, confirmed {way}; `pneuarm reset` leaves the stop"
-    print(json.dumps({"stopped": True, "confirmed": way}) if arguments.json else text)
     return 0
 
 

@@ -6,7 +6,6 @@ import queue
 import threading
 
 from pneuarm.service.configuration.configuration import load, rerun_url
-from pneuarm.service.devices import registry as backends
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -55,7 +54,9 @@ def config(arguments: argparse.Namespace) -> int:
     if arguments.action == "show":
         print(configuration.to_toml(), end="")
     else:
-        backends.check(configuration)
+        from pneuarm.service.daemon.requirements import check_machine
+
+        check_machine(configuration)
         sections = len(configuration.arm.sections)
         where = arguments.config or f"preset {configuration.preset}"
         print(

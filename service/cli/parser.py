@@ -7,14 +7,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from pneuarm.controllers.arm.errors import PneuarmError
+from pneuarm.service.cli.ending import ended
+from pneuarm.service.cli.values import Parser, number, whole
 
 Command = Callable[[argparse.Namespace], int]
-Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 PRESETS = ("paper", "table1", "trunk")
 
 _ENDPOINT = "tcp/127.0.0.1:7447"
+_POSITIVE = number(0, above=True)
+_SEED = whole(0, 2**32 - 1)
 
 
 def _call(where: str, arguments: argparse.Namespace) -> int:
@@ -24,9 +27,7 @@ def _call(where: str, arguments: argparse.Namespace) -> int:
     return function(arguments)
 
 
-def _complete_when_used(
-    parser: argparse.ArgumentParser, complete: Callable[[argparse.ArgumentParser], None]
-) -> None:
+def _complete_when_used(parser: Parser, complete: Callable[[Parser], None]) -> None:
     """Add what the installed devices need once it is parsed: other commands do not wait for it."""
     plain = parser.parse_known_args
 
@@ -38,9 +39,9 @@ def _complete_when_used(
     parser.parse_known_args = parse  # type: ignore[method-assign]
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """Return the parser of all commands."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="pneuarm", description="Real-time control service for soft pneumatic arms."
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -55,9 +56,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _command(
-    commands: Subparsers, name: str, where: str, help_text: str
-) -> argparse.ArgumentParser:
+def _command(commands: Subparsers, name: str, where: str, help_text: str) -> Parser:
     parser = commands.add_parser(name, help=help_text, description=help_text)
     parser.set_defaults(where=where)
     return parser
@@ -87,10 +86,12 @@ def _add_daemon(commands: Subparsers) -> None:
         "pneuarm.service.demo.demo:demo",
         "Daemon and client as processes: circle, eight, ...",
     )
-    demo.add_argument("--seconds", type=float, default=30.0, help="length of the show (default 30)")
+    demo.add_argument(
+        "--seconds", type=number(1, 3600), default=30.0, help="length of the show (default 30)"
+    )
     _complete_when_used(demo, _add_adapter)
     demo.add_argument("--arm", choices=PRESETS, default="paper")
-    demo.add_argument("--seed", type=int, default=0, help="seed of the simulated arm")
+    demo.add_argument("--seed", type=_SEED, default=0, help="seed of the simulated arm")
     demo.add_argument("--json", action="store_true", help="one JSON object instead of the table")
 
 
@@ -113,12 +114,12 @@ def _add_emulated_devices(commands: Subparsers) -> None:
             f"{device.summary}, with the simulated arm behind it.",
         )
         parser.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
-        parser.add_argument("--seed", type=int, default=0, help="seed of the arm behind it")
+        parser.add_argument("--seed", type=_SEED, default=0, help="seed of the arm behind it")
         parser.add_argument("--record", type=Path, metavar="FILE", help="what reaches it: JSON")
         device.add_arguments(parser)
 
 
-def _add_adapter(demo: argparse.ArgumentParser) -> None:
+def _add_adapter(demo: Parser) -> None:
     from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
     from pneuarm.service.configuration.devices import emulated_devices
 
@@ -133,11 +134,13 @@ def _add_emulated_camera(devices: Subparsers) -> None:
     )
     camera.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
     camera.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
-    camera.add_argument("--rate", type=float, default=100.0, help="poses a second (100)")
-    camera.add_argument("--delay-ms", type=float, default=10.0, help="age of a pose (10)")
-    camera.add_argument("--noise-mm", type=float, default=0.1, help="on every axis (0.1)")
-    camera.add_argument("--seed", type=int, default=0, help="seed of the noise")
-    camera.add_argument("--seconds", type=float, default=0.0, help="end after (0: Ctrl-C)")
+    camera.add_argument(
+        "--rate", type=number(0, 1e4, above=True), default=100.0, help="poses a second (100)"
+    )
+    camera.add_argument("--delay-ms", type=number(0, 1e4), default=10.0, help="age of a pose (10)")
+    camera.add_argument("--noise-mm", type=number(0, 1e4), default=0.1, help="on every axis (0.1)")
+    camera.add_argument("--seed", type=_SEED, default=0, help="seed of the noise")
+    camera.add_argument("--seconds", type=number(0), default=0.0, help="end after (0: Ctrl-C)")
 
 
 def _add_client(commands: Subparsers) -> None:
@@ -162,11 +165,11 @@ def _add_client(commands: Subparsers) -> None:
         (twist, 3, "VX VY VZ, mm/s"),
     ):
         parser.add_argument("values", nargs=count, type=float, metavar="VALUE", help=names)
-    point.add_argument("--station", type=float, required=True, help="0 the base, 1 the tip")
+    point.add_argument("--station", type=number(0, 1), required=True, help="0 the base, 1 the tip")
     twist.add_argument("--angular", nargs=3, type=float, metavar=("WX", "WY", "WZ"), help="deg/s")
     twist.add_argument("--frame", choices=("base", "tip"), default="base")
     twist.add_argument("--point", choices=("tip", "base"), default="tip", help="reference point")
-    twist.add_argument("--seconds", type=float, default=1.0)
+    twist.add_argument("--seconds", type=_POSITIVE, default=1.0)
     lengths = kinds.add_parser("lengths", help="chamber lengths, three a section, mm")
     pressures = kinds.add_parser("pressures", help="gauge pressures, three a section, bar")
     for parser in (lengths, pressures):
@@ -177,7 +180,7 @@ def _add_client(commands: Subparsers) -> None:
         parser.add_argument("--enable", action="store_true", help="arm first")
         parser.add_argument("--take-over", action="store_true", help="take the lease from another")
         parser.add_argument("--law", choices=("resolved_rate", "qp_ik"))
-        parser.add_argument("--timeout", type=float, default=10.0, help="give up after (s)")
+        parser.add_argument("--timeout", type=_POSITIVE, default=10.0, help="give up after (s)")
     helps = {
         "enable": "Take the lease and arm; the next `send` goes on from there.",
         "hold": "Keep the last pressures.",
@@ -193,7 +196,7 @@ def _add_client(commands: Subparsers) -> None:
         _command(
             commands,
             "estop",
-            "pneuarm.service.cli.client_commands:estop",
+            "pneuarm.service.cli.stop:estop",
             "Stop: vent at once, and latch.",
         )
     )
@@ -204,22 +207,22 @@ def _add_client(commands: Subparsers) -> None:
     _add_connection(state)
 
 
-def _add_shapes(kinds: Subparsers) -> list[argparse.ArgumentParser]:
+def _add_shapes(kinds: Subparsers) -> list[Parser]:
     circle = kinds.add_parser("circle", help="tip on a circle: center and radius, mm")
     circle.add_argument("values", nargs=4, type=float, metavar="VALUE", help="X Y Z RADIUS, mm")
-    circle.add_argument("--frequency", type=float, default=0.25, help="turns a second (0.25)")
-    circle.add_argument("--turns", type=float, default=1.0)
+    circle.add_argument("--frequency", type=_POSITIVE, default=0.25, help="turns a second (0.25)")
+    circle.add_argument("--turns", type=_POSITIVE, default=1.0)
     circle.add_argument("--normal", nargs=3, type=float, default=(0.0, 0.0, 1.0), metavar="N")
     line = kinds.add_parser("line", help="tip from one point to another and back, mm")
     line.add_argument("values", nargs=6, type=float, metavar="VALUE", help="X Y Z X Y Z, mm")
-    line.add_argument("--period", type=float, default=4.0, help="s, there and back (4)")
-    line.add_argument("--repeats", type=float, default=1.0)
+    line.add_argument("--period", type=_POSITIVE, default=4.0, help="s, there and back (4)")
+    line.add_argument("--repeats", type=_POSITIVE, default=1.0)
     trajectory = kinds.add_parser("trajectory", help="tip through timed waypoints of a file")
     trajectory.add_argument("file", type=Path, help="lines of: time in s, then x y z in mm")
     return [circle, line, trajectory]
 
 
-def _add_connection(parser: argparse.ArgumentParser) -> None:
+def _add_connection(parser: Parser) -> None:
     parser.add_argument("--arm", default="paper", help="name of the arm (default: paper)")
     parser.add_argument("--connect", default=_ENDPOINT, help=f"daemon (default: {_ENDPOINT})")
     parser.add_argument("--zenoh-config", default="", help="Zenoh configuration, for TLS")
@@ -234,11 +237,11 @@ def _add_logs(commands: Subparsers) -> None:
         "Show a recorded session again.",
     )
     replay.add_argument("log", type=Path)
-    replay.add_argument("--speed", type=float, default=1.0)
+    replay.add_argument("--speed", type=_POSITIVE, default=1.0)
     replay.add_argument("--loop", action="store_true")
     replay.add_argument("--to", choices=("rerun", "zenoh"), default="rerun")
     replay.add_argument("--listen", default=_ENDPOINT, help="where to listen, with --to zenoh")
-    replay.add_argument("--port", type=int, default=9876, help="port of Rerun's server")
+    replay.add_argument("--port", type=whole(1, 65535), default=9876, help="port of Rerun's server")
     info = _command(
         commands,
         "info",
@@ -268,8 +271,10 @@ def _add_workspace(commands: Subparsers) -> None:
     )
     workspace.add_argument("--arm", choices=PRESETS, default="paper")
     workspace.add_argument("--out", type=Path, metavar="DIR", help="write picture, mesh, samples")
-    workspace.add_argument("--samples", type=int, default=20000, help="random points (20000)")
-    workspace.add_argument("--seed", type=int, default=0, help="seed of the random points")
+    workspace.add_argument(
+        "--samples", type=whole(1, 10_000_000), default=20000, help="random points (20000)"
+    )
+    workspace.add_argument("--seed", type=_SEED, default=0, help="seed of the random points")
     workspace.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
 
@@ -313,14 +318,11 @@ def _add_calibrate(commands: Subparsers) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; an error is one sentence on stderr and the exit status 1."""
-    parsed = build_parser().parse_args(arguments)
-    try:
+    """Run one command; an error is one sentence on stderr and the exit status 1 (2: its usage)."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+
+    def command() -> int:
+        parsed = build_parser().parse_args(words)
         return _call(parsed.where, parsed)
-    except PneuarmError as error:
-        print(f"pneuarm: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        return 0
+
+    return ended(command, stops=words[:1] == ["estop"])

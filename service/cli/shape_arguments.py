@@ -8,35 +8,24 @@ from pathlib import Path
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.target_messages import circle_target, line_target, trajectory_target
+from pneuarm.service.configuration.text_file import read_text
 
 MM = 1e-3
 
 
 def shape_of(arguments: argparse.Namespace, law: "pb.Law") -> pb.Target:
-    """Return the target of `send circle`, `send line` or `send trajectory`, run for once.
-
-    Raises InvalidInput for what would take no time, or no end of it.
-    """
+    """Return the target of `send circle`, `send line` or `send trajectory`, run for once."""
     shape_id = secrets.randbelow(2**16)  # so that the same shape can be sent twice
     if arguments.kind == "trajectory":
         return trajectory_target(read_waypoints(arguments.file), shape_id, law)
     values = [MM * value for value in arguments.values]
     if arguments.kind == "circle":
-        _require_positive(arguments, "frequency", "turns")
         normal = arguments.normal
         center, radius = values[:3], values[3]
         return circle_target(
             center, radius, arguments.frequency, arguments.turns, normal, shape_id, law
         )
-    _require_positive(arguments, "period", "repeats")
     return line_target(values[:3], values[3:], arguments.period, arguments.repeats, shape_id, law)
-
-
-def _require_positive(arguments: argparse.Namespace, *names: str) -> None:
-    for name in names:
-        value = getattr(arguments, name)
-        if not 0.0 < value < math.inf:
-            raise InvalidInput(f"--{name} {value:g}: a finite number above 0 is needed")
 
 
 def duration_s(target: pb.Target) -> float:
@@ -56,20 +45,16 @@ def read_waypoints(path: Path) -> list[tuple[float, list[float]]]:
 
     Lines that begin with # are left out. Raises InvalidInput with the line that is wrong.
     """
-    try:
-        lines = path.read_text().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} cannot be read: {error}") from error
     waypoints = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         try:
             time_s, x, y, z = _finite(line)
         except ValueError:
             raise InvalidInput(
-                f"{path}, line {number}: {line!r}; four numbers are needed: time in s, then x y z "
-                "in mm"
+                f"{path}, line {number}: {line[:80]!r}; four numbers are needed: time in s, then "
+                "x y z in mm"
             ) from None
         waypoints.append((time_s, [MM * x, MM * y, MM * z]))
     if not waypoints:

@@ -27,6 +27,7 @@ from pneuarm.controllers.arm.errors import (
     PneuarmError,
     TargetRejected,
 )
+from pneuarm.controllers.arm.names import check_arm_name
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode, encoding_of
 from pneuarm.logs.schema.printable import name_of, printable
@@ -94,7 +95,8 @@ class Client:
     """One connection to the daemon of one arm; a context manager.
 
     Positions are in metres in the base frame, pressures in pascal (gauge), lengths in metres.
-    Raises DaemonUnreachable if nobody answers under ``connect``.
+    Raises DaemonUnreachable if nobody answers under ``connect``, InvalidInput for what is no
+    address or no arm's name.
     """
 
     def __init__(
@@ -104,6 +106,7 @@ class Client:
         name: str = "",
         zenoh_config_file: str = "",
     ) -> None:
+        check_arm_name(arm)
         self.arm = arm
         self.client_id = new_client_id(name)
         self._process = os.getpid()
@@ -112,9 +115,18 @@ class Client:
         self._sequence = 0
         self._newest: pb.ArmState | None = None
         self._received_s = 0.0
-        self._declare(connect)
+        with network.failing_in_words():
+            self._declare()
+        try:
+            self.state()
+        except DaemonUnreachable:
+            self.close()
+            raise DaemonUnreachable(
+                f"a daemon listens at {connect}, but none for arm {self.arm!r}; name the arm with "
+                "--arm, or start it with `pneuarm run`"
+            ) from None
 
-    def _declare(self, connect: str) -> None:
+    def _declare(self) -> None:
         session = self._session
         alive = full_key(self.arm, f"{ALIVE_CLIENT}/{self.client_id}")
         self._token = session.liveliness().declare_token(alive)
@@ -127,14 +139,6 @@ class Client:
             congestion_control=zenoh.CongestionControl.DROP,
             express=True,
         )
-        try:
-            self.state()
-        except DaemonUnreachable:
-            self.close()
-            raise DaemonUnreachable(
-                f"a daemon listens at {connect}, but none for arm {self.arm!r}; name the arm with "
-                "--arm, or start it with `pneuarm run`"
-            ) from None
 
     def _key(self, topic: Topic) -> str:
         return full_key(self.arm, topic.key)
@@ -236,14 +240,15 @@ class Client:
     ) -> Iterator[M]:
         """Yield the daemon's answers: what others answer under its key is passed over."""
         self._check_process()
-        replies = self._session.get(
-            self._key(topic),
-            payload=payload,
-            timeout=timeout_s,
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            **options,
-        )
+        with network.failing_in_words():
+            replies = self._session.get(
+                self._key(topic),
+                payload=payload,
+                timeout=timeout_s,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                **options,
+            )
         for reply in replies:
             source = reply.replier_id
             zid = getattr(source, "zid", source)  # older versions of Zenoh return it itself
@@ -328,11 +333,17 @@ class Client:
         """
         try:
             self._check_process()
-        except DaemonUnreachable as error:
-            raise NotConfirmed(f"NOT CONFIRMED: {error}; cut the air supply") from error
+            return self._stop(timeout_s)
+        except NotConfirmed:
+            raise
+        except Exception as error:
+            raise NotConfirmed(str(error) or type(error).__name__) from error
+
+    def _stop(self, timeout_s: float) -> pb.ArmState:
         nonce, until = os.urandom(16), time.monotonic() + timeout_s
-        with contextlib.suppress(DaemonUnreachable, MessageRejected, zenoh.ZError):
-            self._session.put(self._key(ESTOP), nonce, **_URGENT)
+        with contextlib.suppress(DaemonUnreachable, MessageRejected):
+            with network.failing_in_words():
+                self._session.put(self._key(ESTOP), nonce, **_URGENT)
             while (left_s := until - time.monotonic()) > 0.0:
                 for reply in self._ask(
                     ESTOP, nonce, pb.Reply, min(left_s, _STOP_AGAIN_S), **_URGENT
@@ -340,10 +351,7 @@ class Client:
                     if reply.accepted and reply.mode == pb.ESTOP and reply.nonce == nonce:
                         return self._stopped(reply, until)
                 time.sleep(0.01)  # nobody takes the question: no daemon, or one that starts
-        raise NotConfirmed(
-            f"NOT CONFIRMED: the daemon of arm {self.arm!r} did not answer the stop; cut the air "
-            "supply"
-        )
+        raise NotConfirmed(f"the daemon of arm {self.arm!r} did not answer the stop")
 
     def _stopped(self, reply: pb.Reply, until_s: float) -> pb.ArmState:
         """Return the state of the tick that stopped, or what the answer tells of it."""
@@ -368,7 +376,8 @@ class Client:
         target.lease_secret = self._secret
         target.sequence = self._sequence
         target.state_sequence = self.state().sequence
-        self._targets.put(target.SerializeToString())
+        with network.failing_in_words():
+            self._targets.put(target.SerializeToString())
         return self._sequence
 
     def send_position(

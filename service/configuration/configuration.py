@@ -25,6 +25,7 @@ from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.simulator.device import SimulatorConfig, simulated_arm
 from pneuarm.hardware.tables.arm import ArmConfig
 from pneuarm.hardware.tables.table import Table
+from pneuarm.logs.schema.printable import printable
 from pneuarm.service.configuration.devices import AnyDevice, devices
 from pneuarm.service.configuration.tables.control import ControlConfig
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig, ReferenceConfig
@@ -32,6 +33,11 @@ from pneuarm.service.configuration.tables.frames import FramesConfig
 from pneuarm.service.configuration.tables.hardware import HardwareConfig
 from pneuarm.service.configuration.tables.monitors import MOVED, MonitorsConfig, moved
 from pneuarm.service.configuration.tables.outputs import LogConfig, RerunConfig, ZenohConfig
+from pneuarm.service.configuration.text_file import read_text
+from pneuarm.service.network.endpoint import Endpoint, in_url
+
+#: Characters of a refusal, and of a value in it.
+_LONGEST, _LONGEST_VALUE = 2000, 200
 
 PRESETS = ("paper", "table1", "trunk")
 
@@ -63,6 +69,19 @@ class _Configuration(Table):
             raise ValueError(
                 f"simulator.arm has {there} sections, arm has {here}; the numbers must be equal"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _one_listener_a_port(self) -> "_Configuration":
+        taken: dict[int, str] = {}
+        wanted = [(text, Endpoint.parse(text)) for text in self.zenoh.listen]
+        ports = [(f"zenoh.listen {text}", point.port) for text, point in wanted if point.is_tcp]
+        if self.rerun.enabled and self.rerun.start_server:
+            ports.append(("rerun.port", self.rerun.port))
+        for name, port in ports:
+            if port and port in taken:
+                raise ValueError(f"{name} and {taken[port]} have the same port {port}")
+            taken[port or 0] = name
         return self
 
     def build_arm(self) -> Arm:
@@ -122,26 +141,37 @@ else:
 
 
 def log_directory(configuration: Configuration) -> Path:
-    """Return the directory of the sessions: the configured one, or in the user's state."""
-    named = configuration.log.directory
+    """Return the directory of the sessions: the configured one, or in the user's state.
+
+    Raises ConfigurationError where there is neither.
+    """
+    if configuration.log.directory:
+        return Path(configuration.log.directory).expanduser()
     default = user_state_path("pneuarm") / "sessions"
-    return Path(named).expanduser() if named else default
+    if not default.is_absolute():
+        raise ConfigurationError(
+            "log.directory is missing, and this user has no home folder to take instead: name a "
+            "folder for the sessions"
+        )
+    return default
 
 
 def rerun_url(configuration: Configuration) -> str:
     """Address under which a Rerun viewer finds the live view."""
     bind = configuration.rerun.bind
-    host = "127.0.0.1" if bind in ("0.0.0.0", "::") else bind
-    return f"rerun+http://{host}:{configuration.rerun.port}/proxy"
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(bind, bind)
+    return f"rerun+http://{in_url(host)}:{configuration.rerun.port}/proxy"
 
 
 def load(path: Path | None = None, preset: str | None = None) -> Configuration:
     """Read a file over a built-in arm; raises ConfigurationError with one sentence a mistake."""
     where = str(path) if path else "configuration"
-    own = {} if path is None else _read(path)
+    own = {} if path is None else _read(path, where)
     name = preset or own.get("preset", "paper")
     if name not in PRESETS:
-        raise ConfigurationError(f"{where}: preset = {name!r}; allowed: {', '.join(PRESETS)}")
+        raise ConfigurationError(
+            printable(f"{where}: preset = {_value(name)}; allowed: {', '.join(PRESETS)}")
+        )
     text = files("pneuarm.service.configuration").joinpath("presets", f"{name}.toml").read_text()
     return check(_laid_over(tomllib.loads(text), own | {"preset": name}), where)
 
@@ -155,7 +185,7 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
         items = error.errors()
         if len(items) > 1:  # a list counts as short because its elements were refused: no news
             items = [item for item in items if item["type"] != "too_short"]
-        lines = [f"{where}: {_sentence(item)}" for item in items]
+        lines = [printable(f"{where}: {_sentence(item)}", _LONGEST) for item in items]
         raise ConfigurationError("\n".join(lines)) from error
     except InvalidInput as error:
         raise ConfigurationError(f"{where}: arm: {error}") from error
@@ -164,19 +194,25 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
 
 def recorded(toml: str, where: str) -> Configuration:
     """Check the configuration of a session, maybe of before a key moved; ConfigurationError."""
-    tables = tomllib.loads(toml)
+    tables = _tables(toml, where)
     if isinstance(tables.get("monitors"), dict):
         tables["monitors"] = moved(tables["monitors"])
     return check(tables, where)
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path, where: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text())
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ConfigurationError(f"{path} is not TOML: {error}") from error
+        text = read_text(path)
+    except InvalidInput as error:
+        raise ConfigurationError(str(error)) from error
+    return _tables(text, where)
+
+
+def _tables(text: str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a number of 6000 digits is a ValueError
+        raise ConfigurationError(f"{where} is not TOML: {error}") from error
 
 
 def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
@@ -206,7 +242,16 @@ def _sentence(item: Any) -> str:
     message = item["msg"].removeprefix("Value error, ")
     if item["type"] == "value_error":
         return f"{key}: {message}"
-    return f"{key} = {item['input']!r}: {message[0].lower()}{message[1:]}"
+    return f"{key} = {_value(item['input'])}: {message[0].lower()}{message[1:]}"
+
+
+def _value(value: object) -> str:
+    """Return a value as Python writes it, as far as anybody reads it."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # thousands of digits, or of tables in each other
+        return "a value without end"
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
 
 
 def _keys_beside(location: tuple[int | str, ...]) -> list[str]:

@@ -4,7 +4,6 @@ It imports neither zenoh, rerun nor mcap, and waits for nobody but the clock.
 """
 
 import os
-import socket
 import time
 from multiprocessing.connection import Connection
 
@@ -20,6 +19,7 @@ from pneuarm.service.devices import registry as backends
 from pneuarm.service.modes.mode_keeper import Notice, Timeouts
 from pneuarm.service.processes import realtime
 from pneuarm.service.processes.device_slots import LinkedDevice
+from pneuarm.service.processes.lock import Lock
 from pneuarm.service.processes.pipe import Command, ModeReply, Pipe, Shutdown
 from pneuarm.service.processes.shared import REALTIME, START_FAILED, Shared, ignore_terminal_signals
 from pneuarm.service.processes.telling import Telling
@@ -117,7 +117,11 @@ class ControlProcess:
         commands: list[Command] = []
         for pipe in (self._supervisor, self._requests, self._stream):
             for _ in range(_COMMANDS_PER_TICK):
-                message = pipe.receive()
+                try:
+                    message = pipe.receive()
+                except Exception as error:  # what cannot be read is no reason to let go of the arm
+                    self._loop.announce(_unreadable(error))
+                    continue
                 if message is None:
                     break
                 if isinstance(message, Shutdown):
@@ -149,13 +153,23 @@ class ControlProcess:
         self._loop.announce(Notice(level, REALTIME, f"real-time {text}, {memory}"))
 
 
+def _unreadable(error: Exception) -> Notice:
+    return Notice(
+        pb.ERROR,
+        "command_unreadable",
+        "a message from another process of the daemon cannot be read, and was left out",
+        f"{type(error).__name__}: {error}",
+        "report it with the log",
+    )
+
+
 def main(
     shared: Shared,
     supervisor: Pipe,
     requests: Pipe,
     stream: Pipe,
-    arm_lock: socket.socket,
-    device_lock: socket.socket,
+    arm_lock: Lock,
+    device_lock: Lock,
     end: Connection,
 ) -> None:
     """Entry point of the process.

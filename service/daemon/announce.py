@@ -10,7 +10,7 @@ from pneuarm.logs.schema.event_line import event_line
 from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import rerun_url
 from pneuarm.service.devices import registry as backends
-from pneuarm.service.network.sessions import is_loopback
+from pneuarm.service.network.endpoint import Endpoint
 from pneuarm.service.processes.shared import REALTIME, START_FAILED, Shared
 from pneuarm.service.processes.telling import sameness
 
@@ -37,7 +37,7 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
         f"log        {shared.info.log_path}",
     ]
     lines += [f"WARNING    {text}" for text in backends.warnings(configuration)]
-    exposed = [endpoint for endpoint in zenoh.listen if not is_loopback(endpoint)]
+    exposed = [text for text in zenoh.listen if not Endpoint.parse(text).is_loopback]
     if exposed:
         lines.append(
             f"WARNING    listening on {', '.join(exposed)}: anyone on that network can move the arm"

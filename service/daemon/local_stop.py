@@ -1,13 +1,12 @@
-"""The lock on a device and on an arm's name, and the stop that needs no network.
+"""The stop that needs no network: an abstract Unix socket of the arm's name.
 
-Both are abstract Unix sockets: the kernel frees them with the last process that holds them,
-however it ends, and they leave no file behind. Whoever connects to the arm's socket and sends
-``estop`` stops the arm, and is told whether it acted.
+The kernel frees it with the supervisor, however that ends, and it leaves no file behind. Whoever
+connects to it and sends ``estop`` stops the arm, and is told whether it acted. Nothing is loaded
+here that a stop could fail at.
 """
 
 import contextlib
 import socket
-import struct
 import time
 from collections.abc import Sequence
 
@@ -20,36 +19,23 @@ _SILENT_S = 1.0
 _MOST_CALLERS = 128
 
 
-def _address(kind: str, name: str) -> str:
-    return f"\0pneuarm/{kind}/{name}"
+def _address(arm_name: str) -> str:
+    return f"\0pneuarm/arm/{arm_name}"
 
 
-def lock(kind: str, name: str) -> socket.socket:
-    """Take the lock on a device or an arm; raises AlreadyInUse if another daemon has it."""
+def listen(arm_name: str) -> socket.socket:
+    """Listen for stops of an arm; raises AlreadyInUse where somebody does so already."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
     try:
-        listener.bind(_address(kind, name))
+        listener.bind(_address(arm_name))
+        listener.listen(_MOST_CALLERS)
     except OSError as error:
         listener.close()
-        process_id = _holder(kind, name)
-        who = f" (process {process_id})" if process_id is not None else ""
         raise AlreadyInUse(
-            f"{kind} {name!r} is in use by another pneuarm daemon{who}; stop that one first, or "
-            f"name another {kind}",
-            process_id,
+            f"the stop of arm {arm_name!r} on this machine cannot be listened for "
+            f"({error.strerror}): another program has its address; end that one first"
         ) from error
-    listener.listen(_MOST_CALLERS)
     return listener
-
-
-def _holder(kind: str, name: str) -> int | None:
-    """Process number of who holds a lock, as far as the kernel tells."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe, contextlib.suppress(OSError):
-        probe.settimeout(0.2)
-        probe.connect(_address(kind, name))
-        credentials = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
-        return int(struct.unpack("3i", credentials)[0])
-    return None
 
 
 class Callers:
@@ -117,7 +103,7 @@ def stop_locally(arm_name: str) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(_CONFIRM_S)
         try:
-            connection.connect(_address("arm", arm_name))
+            connection.connect(_address(arm_name))
             connection.sendall(b"estop\n")
             answer = connection.recv(64)
         except ConnectionRefusedError as error:
@@ -127,7 +113,4 @@ def stop_locally(arm_name: str) -> None:
         except OSError:  # it is there, and stuck
             answer = b""
     if answer != b"stopped\n":
-        raise NotConfirmed(
-            f"NOT CONFIRMED: the daemon of arm {arm_name!r} did not say that it stopped; cut the "
-            "air supply"
-        )
+        raise NotConfirmed(f"the daemon of arm {arm_name!r} did not say that it stopped")

@@ -6,36 +6,35 @@ import os
 import select
 import signal
 import socket
-import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
 from multiprocessing import get_context
 
-from pneuarm.controllers.arm.errors import ConfigurationError, HardwareError
+from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.logs.recording.session import part_path, session_name
 from pneuarm.logs.rings.ring import RingReader
 from pneuarm.logs.rings.rings import MessageReader, MessageWriter, Rings
 from pneuarm.logs.rings.status import RecorderStatus, ViewerStatus
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import EVENT
-from pneuarm.service.configuration.configuration import Configuration, log_directory
+from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.daemon.announce import Announcer, start_facts
 from pneuarm.service.daemon.info import info_of
-from pneuarm.service.daemon.local_stop import Callers, lock
+from pneuarm.service.daemon.local_stop import Callers, listen
 from pneuarm.service.daemon.log_watch import LogWatch
 from pneuarm.service.daemon.repair import start_mending
+from pneuarm.service.daemon.requirements import check_machine, check_ports, make_directory
 from pneuarm.service.daemon.sd_notify import ServiceManager
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.devices.keeper import DeviceKeeper
 from pneuarm.service.modes.mode import ModeEvent
-from pneuarm.service.network.sessions import check_free, read_config
 from pneuarm.service.processes.child import Child
 from pneuarm.service.processes.device_slots import DeviceLink
+from pneuarm.service.processes.lock import lock
 from pneuarm.service.processes.pipe import ModeReply, Pipe, RequestMode, Shutdown, new_pipe
 from pneuarm.service.processes.shared import ENDING_SIGNALS, REALTIME, START_FAILED, Shared
 from pneuarm.service.processes.usage import ProcessTable
-from pneuarm.service.wire.tip_pose_source import read_key
 
 _PERIOD_S = 0.02
 
@@ -71,12 +70,11 @@ class Supervisor:
         """Take the locks and check the ports; raises ConfigurationError, nothing started yet."""
         self._say = say
         self._arm_lock = lock("arm", configuration.arm.name)
-        self._callers = Callers(self._arm_lock)
-        backends.check(configuration)
+        self._callers = Callers(listen(configuration.arm.name))
+        check_machine(configuration)
         self._device_lock = lock("device", backends.address(configuration))
-        self._check_ports(configuration)
-        self._directory = log_directory(configuration)
-        self._make_directory()
+        check_ports(configuration)
+        self._directory = make_directory(configuration)
         os.environ.update(_SINGLE_THREADED)
         self._context = get_context("spawn")
         self._shared = self._share(configuration)
@@ -93,26 +91,6 @@ class Supervisor:
         self._request_id = 1
         self._ending = False
         self._service_manager = ServiceManager()
-
-    @staticmethod
-    def _check_ports(configuration: Configuration) -> None:
-        read_config(configuration.zenoh.config_file)
-        read_key(configuration.feedback)
-        for endpoint in configuration.zenoh.listen:
-            check_free("zenoh.listen", endpoint)
-        if configuration.rerun.enabled and configuration.rerun.start_server:
-            rerun = configuration.rerun
-            check_free("rerun.port", f"tcp/{rerun.bind}:{rerun.port}")
-
-    def _make_directory(self) -> None:
-        try:
-            self._directory.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=self._directory).close()
-        except OSError as error:
-            raise ConfigurationError(
-                f"log.directory: {self._directory} cannot be written to ({error.strerror}); name "
-                "a folder that this user may write to"
-            ) from error
 
     def _share(self, configuration: Configuration) -> Shared:
         arm = configuration.build_arm()

@@ -7,6 +7,7 @@ import ctypes
 import os
 import signal
 import subprocess
+import sys
 import time
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.arm.errors import ConfigurationError, PneuarmError
 from pneuarm.logs.rings.ring import RingReader
 from pneuarm.logs.rings.rings import MessageReader
 from pneuarm.logs.rings.tick import tick_dtype
@@ -24,6 +25,7 @@ from pneuarm.logs.schema.topics import EVENT
 from pneuarm.logs.view.view import View
 from pneuarm.service.configuration.configuration import Configuration, rerun_url
 from pneuarm.service.processes import realtime
+from pneuarm.service.processes.last_resort import sentence
 from pneuarm.service.processes.shared import (
     Shared,
     end_with_parent,
@@ -91,6 +93,10 @@ def open_viewer(url: str) -> None:
     )
 
 
+class ViewerLost(PneuarmError):
+    """The live view ended by itself; it is started anew."""
+
+
 class Viewing:
     """Feeds the view from the rings."""
 
@@ -123,12 +129,16 @@ def main(shared: Shared, end: Connection) -> None:
     server = start_server(configuration) if configuration.rerun.start_server else None
     if server is not None:
         shared.processes.started("rerun", server.pid)
+    status = 0
     try:
         _run(shared, end, server)
+    except Exception as error:
+        print(f"ERROR      viewer: {sentence(error)}", file=sys.stderr, flush=True)
+        status = 1
     finally:
         if server is not None:
             server.terminate()
-        os._exit(0)  # Rerun would wait for a server that is gone
+        os._exit(status)  # Rerun would wait for a server that is gone
 
 
 def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes] | None") -> None:
@@ -140,7 +150,7 @@ def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes] | Non
     viewing, stepped_s = Viewing(shared, view), time.monotonic()
     while not end.poll(_PERIOD_S) and parent_is_alive():
         if server is not None and server.poll() is not None:
-            break
+            raise ViewerLost(f"Rerun's server ended with status {server.returncode}")
         if time.monotonic() - stepped_s > _STALLED_S:
             recording, viewing.view = _connect(shared)
         stepped_s = time.monotonic()

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
-from pneuarm.controllers.arm.errors import DaemonUnreachable, InvalidInput, PneuarmError
+from pneuarm.controllers.arm.errors import DaemonUnreachable, PneuarmError
 from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import Configuration, check, load
 from pneuarm.service.demo.device import emulated
@@ -31,8 +31,6 @@ _END_S = 70.0  # the daemon's own last resort comes after 60 s
 
 def demo(arguments: argparse.Namespace) -> int:
     """Run the show and print its table."""
-    if not arguments.seconds >= 1.0:
-        raise InvalidInput(f"--seconds {arguments.seconds:g}: at least 1 is needed")
     with emulated(arguments.adapter, arguments.arm, arguments.seed) as device:
         configuration = check(_laid_over(arguments, device), "the demo")
         with Screen(configuration) as screen:

@@ -1,6 +1,5 @@
 """Whether the arm's device can be reached, without a word to it: nothing is read or written."""
 
-import getpass
 import grp
 import os
 import shlex
@@ -11,6 +10,7 @@ from pneuarm.hardware.device import Bus, SerialPort, TcpPort
 from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.doctor.finding import Finding, Verdict
+from pneuarm.service.processes.user import user_name
 
 _NAME = "device"
 _PATIENCE_S = 1.0
@@ -39,8 +39,8 @@ def serial(path: str) -> Finding:
         return Finding(
             _NAME,
             Verdict.FAILED,
-            f"{path} may not be opened by {getpass.getuser()}",
-            f"sudo usermod -aG {_group(path)} {getpass.getuser()}   # then log out and in again",
+            f"{path} may not be opened by {user_name()}",
+            f"sudo usermod -aG {_group(path)} {user_name()}   # then log out and in again",
         )
     return Finding(_NAME, Verdict.OK, f"{path} is there and may be opened")
 

@@ -14,9 +14,9 @@ from pneuarm.controllers.arm.errors import AlreadyInUse, ConfigurationError
 from pneuarm.logs.rings.rings import HOLD_S
 from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.service.configuration.configuration import Configuration, log_directory
-from pneuarm.service.daemon.local_stop import lock
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.doctor.finding import Finding, Verdict
+from pneuarm.service.processes.lock import lock
 
 _MIB = 1024 * 1024
 _PROBE_MIB = 16
@@ -30,9 +30,9 @@ _SHOWN = ("eclipse-zenoh", "rerun-sdk", "mcap", "osqp", "casadi", "numpy")
 def sessions(configuration: Configuration) -> Finding:
     """Look at the disk that sessions go to: free space, and how fast it writes."""
     name, directory = "sessions", log_directory(configuration)
-    place = next(path for path in (directory, *directory.parents) if path.exists())
-    free_mib = shutil.disk_usage(place).free / _MIB
+    place = next(filter(os.path.lexists, (directory, *directory.absolute().parents)))
     try:
+        free_mib = shutil.disk_usage(place).free / _MIB
         speed = _write_speed(place)
     except OSError as error:
         text = f"{directory} cannot be written to ({error.strerror})"
@@ -100,12 +100,13 @@ def other_daemon(configuration: Configuration) -> Finding:
 
 def ports(configuration: Configuration) -> Finding:
     """See whether Zenoh and Rerun can listen where they are told to."""
+    from pneuarm.service.network.endpoint import in_url
     from pneuarm.service.network.sessions import check_free
 
     name, wanted = "ports", [("zenoh.listen", text) for text in configuration.zenoh.listen]
-    if configuration.rerun.enabled:
+    if configuration.rerun.enabled and configuration.rerun.start_server:
         rerun = configuration.rerun
-        wanted.append(("rerun.port", f"tcp/{rerun.bind}:{rerun.port}"))
+        wanted.append(("rerun.port", f"tcp/{in_url(rerun.bind)}:{rerun.port}"))
     for key, endpoint in wanted:
         try:
             check_free(key, endpoint)

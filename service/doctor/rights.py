@@ -1,11 +1,11 @@
 """What the kernel lets this user's processes do: real-time priority and locked memory."""
 
-import getpass
 import os
 import resource
 from pathlib import Path
 
 from pneuarm.service.doctor.finding import Finding, Verdict
+from pneuarm.service.processes.user import user_name
 
 _CAP_IPC_LOCK, _CAP_SYS_NICE = 14, 23
 _LIMITS = "/etc/security/limits.d/99-pneuarm.conf"
@@ -29,7 +29,7 @@ def _status() -> str:
 def _remedy(line: str, option: str) -> str:
     if in_container():
         return f"start the container with: {option}"
-    user = getpass.getuser()
+    user = user_name()
     return f"echo '{user} - {line}' | sudo tee -a {_LIMITS}   # then log out and in again"
 
 

@@ -8,7 +8,6 @@ is configured.
 import argparse
 import contextlib
 import time
-import tomllib
 from collections import deque
 from dataclasses import replace
 
@@ -27,7 +26,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
 from pneuarm.logs.schema.topics import STATE, TIP_POSE, full_key
 from pneuarm.service.client.client import Client
-from pneuarm.service.configuration.configuration import Configuration, check
+from pneuarm.service.configuration.configuration import Configuration, recorded
 from pneuarm.service.network import sessions as network
 from pneuarm.service.wire.tip_pose_source import read_key, signature
 
@@ -90,10 +89,6 @@ class Camera:
 
 def emulate_camera(arguments: argparse.Namespace) -> int:
     """Publish until Ctrl-C, or for some seconds."""
-    for name in ("rate", "delay_ms", "noise_mm"):
-        value = getattr(arguments, name)
-        if not 0.0 <= value < 1e4 or (name == "rate" and value <= 0.0):
-            raise InvalidInput(f"--{name.replace('_', '-')} {value:g}: a number above 0 is needed")
     delay_s, noise_m = 1e-3 * arguments.delay_ms, 1e-3 * arguments.noise_mm
     configuration = _configuration(arguments)
     frames, feedback = configuration.frames.frames(), configuration.feedback
@@ -112,7 +107,7 @@ def emulate_camera(arguments: argparse.Namespace) -> int:
 def _configuration(arguments: argparse.Namespace) -> Configuration:
     """Ask the daemon where motion capture, marker and tool are, and under which name to publish."""
     with Client(arguments.arm, arguments.connect, "camera") as client:
-        return check(tomllib.loads(client.info().config_toml), "the daemon")
+        return recorded(client.info().config_toml, "the daemon")
 
 
 def _publish(

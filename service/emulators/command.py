@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import signal
 import threading
 from collections.abc import Mapping
@@ -41,11 +42,17 @@ def emulate(arguments: argparse.Namespace) -> int:
 
 def _emulated_arm(arguments: argparse.Namespace, configuration: Configuration) -> EmulatedArm:
     """Make the arm behind an emulator; raises InvalidInput where its record cannot be kept."""
+    if arguments.record is not None and not _may_be_file(arguments.record):
+        raise InvalidInput(f"--record {arguments.record}: it is a folder, a pipe or a device")
     try:
         record = None if arguments.record is None else DeviceRecord(arguments.record)
     except OSError as error:
         raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
     return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
+
+
+def _may_be_file(path: Path) -> bool:
+    return not os.path.lexists(path) or os.path.isfile(path)
 
 
 def _lines(

@@ -1,19 +1,18 @@
 """Opening Zenoh sessions: loopback unless told otherwise, no scouting, a clear word on failure."""
 
-import ipaddress
+import contextlib
 import json
 import os
-import re
 import resource
 import socket
 import threading
 import time
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
 import zenoh
 
-from pneuarm.controllers.arm.errors import ConfigurationError, DaemonUnreachable
+from pneuarm.controllers.arm.errors import ConfigurationError, DaemonUnreachable, InvalidInput
+from pneuarm.service.network.endpoint import Endpoint, in_url
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -39,55 +38,58 @@ _OPEN_S = 8.0
 _opened_by: int | None = None  # number of the process that has opened a session
 
 
-def is_loopback(endpoint: str) -> bool:
-    """Whether an endpoint such as ``tcp/127.0.0.1:7447`` is reached from this machine only."""
-    if endpoint.startswith(("unixsock", "unixpipe")):
-        return True
-    address = re.split("[?#]", endpoint.partition("/")[2])[0]
-    host = address.rpartition(":")[0].strip("[]")
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:  # a name
-        return host == "localhost"
-
-
 def read_config(config_file: str) -> zenoh.Config:
     """Read a Zenoh configuration file, or the defaults; raises ConfigurationError."""
     config: zenoh.Config = zenoh.Config()
     if not config_file:
         return config
-    if not Path(config_file).is_file():
-        raise ConfigurationError(f"zenoh.config_file = {config_file!r}: no such file")
+    where = f"zenoh.config_file = {config_file!r}"
+    if "\0" in config_file or not os.path.exists(config_file):
+        raise ConfigurationError(f"{where}: no such file")
+    if not os.path.isfile(config_file):
+        raise ConfigurationError(f"{where}: it is a folder, a pipe or a device, not a file")
     try:
-        config = zenoh.Config.from_file(config_file)
-    except zenoh.ZError as error:
-        raise ConfigurationError(f"zenoh.config_file = {config_file!r}: {error}") from error
+        with failing_in_words():
+            config = zenoh.Config.from_file(config_file)
+    except ZenohFailed as error:
+        raise ConfigurationError(f"{where}: {error}") from error
     return config
 
 
-def check_free(key: str, endpoint: str) -> None:
+def check_free(key: str, text: str) -> None:
     """Raise ConfigurationError if a TCP endpoint is taken already, before anything is started."""
-    protocol, _, address = endpoint.partition("/")
-    host, _, port = address.rpartition(":")
-    if protocol not in ("tcp", "tls") or not port.isdecimal():
+    endpoint = _endpoint(key, text)
+    if not endpoint.is_tcp or endpoint.port is None:
         return  # Zenoh itself judges other kinds of endpoints
-    if int(port) > 65535:
-        raise ConfigurationError(f"{key}: port {port} of {endpoint}; allowed: 0 to 65535")
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    family = socket.AF_INET6 if ":" in endpoint.host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((host.strip("[]"), int(port)))
-        except OSError as error:
+            probe.bind((endpoint.host, endpoint.port))
+        except (OSError, UnicodeError) as error:
+            where = f"{in_url(endpoint.host)}:{endpoint.port}"
             raise ConfigurationError(
-                f"{key}: {host}:{port} cannot be used ({error.strerror}); is another daemon or "
-                "viewer running there? choose another port"
+                f"{key}: {where} cannot be used ({_why(error)}); is another daemon or viewer "
+                "running there, or is it no address of this machine? choose another"
             ) from error
+
+
+def _endpoint(key: str, text: str) -> Endpoint:
+    try:
+        return Endpoint.parse(text)
+    except InvalidInput as error:
+        raise ConfigurationError(f"{key}: {error}") from error
+
+
+def _why(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def open_listening(listen: Sequence[str], config_file: str) -> zenoh.Session:
     """Open the daemon's session; raises ConfigurationError if it cannot listen there."""
     config = read_config(config_file)
+    for text in listen:
+        _endpoint("zenoh.listen", text)
     config.insert_json5("mode", '"router"')
     config.insert_json5("listen/endpoints", json.dumps(list(listen)))
     config.insert_json5("listen/exit_on_failure", "true")
@@ -103,9 +105,9 @@ def open_listening(listen: Sequence[str], config_file: str) -> zenoh.Session:
     _raise_descriptors()
     try:
         return _open(config)
-    except zenoh.ZError as error:
+    except ZenohFailed as error:
         raise ConfigurationError(
-            f"zenoh.listen = {list(listen)}: cannot listen there ({_short(error)}); is another "
+            f"zenoh.listen = {list(listen)}: cannot listen there ({error}); is another "
             "daemon running? choose another port, e.g. tcp/127.0.0.1:7448"
         ) from error
 
@@ -117,11 +119,15 @@ def _raise_descriptors() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
-def open_connected(endpoint: str, config_file: str = "") -> zenoh.Session:
-    """Open a client's session; raises DaemonUnreachable if nobody answers there."""
+def open_connected(connect: str, config_file: str = "") -> zenoh.Session:
+    """Open a client's session.
+
+    Raises InvalidInput for what is no address, DaemonUnreachable if nobody answers there.
+    """
+    endpoint = Endpoint.parse(connect)
     config = read_config(config_file)
     config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("connect/endpoints", json.dumps([connect]))
     config.insert_json5("scouting/multicast/enabled", "false")
     # A daemon that stands still takes the connection and says nothing; who stops waits for this.
     config.insert_json5("transport/unicast/open_timeout", "2000")
@@ -129,26 +135,39 @@ def open_connected(endpoint: str, config_file: str = "") -> zenoh.Session:
     while True:
         try:
             return _open(config)
-        except zenoh.ZError as error:
+        except ZenohFailed as error:
             if time.monotonic() > give_up_s or not _takes_connections(endpoint):
                 raise DaemonUnreachable(
-                    f"nobody answers at {endpoint} ({_short(error)}); start the daemon with "
+                    f"nobody answers at {connect} ({error}); start the daemon with "
                     "`pneuarm run`, or name its address with --connect"
                 ) from error
         time.sleep(0.05)
 
 
-def _takes_connections(endpoint: str) -> bool:
+def _takes_connections(endpoint: Endpoint) -> bool:
     """Whether a TCP endpoint is listened at: then a refusal may be one of many, and pass."""
-    protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
-    host, _, port = address.rpartition(":")
-    if protocol not in ("tcp", "tls") or not port.isdecimal():
+    if not endpoint.is_tcp or endpoint.port is None:
         return False
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=0.5).close()
-    except (OSError, OverflowError, UnicodeError):
+        socket.create_connection((endpoint.host, endpoint.port), timeout=0.5).close()
+    except (OSError, UnicodeError):
         return False
     return True
+
+
+class ZenohFailed(DaemonUnreachable):
+    """Zenoh raised something; the text is the first line of it."""
+
+
+@contextlib.contextmanager
+def failing_in_words() -> Iterator[None]:
+    """Turn whatever a call of Zenoh's raises into ZenohFailed, its panics too."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit, GeneratorExit):
+        raise
+    except BaseException as error:  # a panic is no Exception
+        raise ZenohFailed(_short(error)) from error
 
 
 def _open(config: zenoh.Config) -> zenoh.Session:
@@ -165,14 +184,16 @@ def _open(config: zenoh.Config) -> zenoh.Session:
             found.append(error)
 
     thread = threading.Thread(target=open_it, name="opening zenoh", daemon=True)
-    thread.start()
+    with failing_in_words():
+        thread.start()
     thread.join(_OPEN_S)
     if not found:
         raise DaemonUnreachable(
             _forked(f"Zenoh did not come up within {_OPEN_S:g} s; was this process forked?")
         )
     if isinstance(found[0], BaseException):
-        raise found[0]
+        with failing_in_words():
+            raise found[0]
     _opened_by = os.getpid()
     return found[0]
 
@@ -184,5 +205,5 @@ def _forked(cause: str) -> str:
     )
 
 
-def _short(error: Exception) -> str:
-    return str(error).split(" at /")[0].split("\n")[0][:160]
+def _short(error: BaseException) -> str:
+    return str(error).split(" at /")[0].split("\n")[0][:160].strip() or type(error).__name__

@@ -1,5 +1,6 @@
 """A child process of the daemon: started with spawn, ended by a word, revived if it may be."""
 
+import contextlib
 import importlib
 import os
 import signal
@@ -9,11 +10,16 @@ from collections.abc import Callable
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import TextIO
 
-from pneuarm.controllers.arm.errors import PneuarmError
+from pneuarm.service.processes.last_resort import sentence
 from pneuarm.service.processes.usage import ProcessTable
 
+#: A dead process is started again this long after its last start, and twice as long each time
+#: that it died soon again: below the 30 s that the rings hold for a recorder.
 _REVIVE_AFTER_S = 1.0
+_LONGEST_WAIT_S = 16.0
+_LIVED_S = 5.0
 
 #: How often somebody who ends a process looks how far it is.
 _LOOK_S = 0.5
@@ -21,15 +27,20 @@ _LOOK_S = 0.5
 
 def enter(name: str, module: str, arguments: tuple[object, ...]) -> None:
     """Run a process's own `main`; this is what the new interpreter starts with."""
-    main: Callable[..., None] = importlib.import_module(module).main
     try:
+        main: Callable[..., None] = importlib.import_module(module).main
         main(*arguments)
-    except PneuarmError as error:
-        print(f"ERROR      {name}: {error}", file=sys.stderr, flush=True)
+    except BaseException as error:
+        _print(f"ERROR      {name}: {sentence(error)}", sys.stderr)
         os._exit(1)  # a library's threads might keep the process from ending
-    sys.stdout.flush()
-    sys.stderr.flush()
+    _print("", sys.stdout, end="")
     os._exit(0)  # nothing is left to do, and the garbage of a frozen heap is nobody's business
+
+
+def _print(text: str, stream: TextIO | None, end: str = "\n") -> None:
+    """Print, where somebody still listens."""
+    with contextlib.suppress(OSError):
+        print(text, end=end, file=stream or sys.stdout, flush=True)
 
 
 class Child:
@@ -52,6 +63,8 @@ class Child:
         self._end: Connection | None = None
         self._restarts = 0
         self._started_s = 0.0
+        self._alive_s = 0.0
+        self._wait_s = _REVIVE_AFTER_S
 
     def start(self) -> None:
         """Start it, or start it again."""
@@ -78,9 +91,16 @@ class Child:
         return self._process is not None and self._process.is_alive()
 
     def revive_if_due(self) -> bool:
-        """Start it again if it is dead, at most once a second; return whether it was."""
-        if self.is_alive() or time.monotonic() - self._started_s < _REVIVE_AFTER_S:
+        """Start it again if it is dead, and dead for long enough; return whether it was."""
+        now_s = time.monotonic()
+        if self.is_alive():
+            self._alive_s = now_s
             return False
+        if self._alive_s - self._started_s > _LIVED_S:
+            self._wait_s = _REVIVE_AFTER_S
+        if now_s - self._started_s < self._wait_s:
+            return False
+        self._wait_s = min(2.0 * self._wait_s, _LONGEST_WAIT_S)
         self._restarts += 1
         self.start()
         return True

@@ -5,7 +5,7 @@ import dataclasses
 import json
 from datetime import UTC, datetime
 
-from pneuarm.controllers.arm.errors import InvalidInput, LogError
+from pneuarm.controllers.arm.errors import LogError
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.summary import LogSummary, summarise
 from pneuarm.service.configuration.configuration import Configuration, recorded
@@ -22,7 +22,14 @@ def recorded_configuration(reader: LogReader) -> Configuration:
             f"{path} lacks the configuration with which it was recorded: every copy in it is "
             "damaged; its ticks can be read, and replayed with --to zenoh"
         )
-    return recorded(reader.info.config_toml, str(path))
+    configuration = recorded(reader.info.config_toml, str(path))
+    sections = len(configuration.arm.sections)
+    if sections != reader.n_sections:
+        raise LogError(
+            f"{path} is damaged: its configuration is of {sections} sections, its facts are of "
+            f"{reader.n_sections}; its ticks can be replayed with --to zenoh"
+        )
+    return configuration
 
 
 def info(arguments: argparse.Namespace) -> int:
@@ -71,8 +78,6 @@ def _missing_lines(summary: LogSummary) -> list[str]:
 
 def replay(arguments: argparse.Namespace) -> int:
     """Show a log again, in Rerun or over Zenoh."""
-    if not arguments.speed > 0:
-        raise InvalidInput(f"--speed {arguments.speed:g}: it must be above 0")
     reader = LogReader(arguments.log)
     if arguments.to == "zenoh":
         from pneuarm.service.replay.to_zenoh import replay_over_zenoh

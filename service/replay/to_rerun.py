@@ -12,6 +12,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.view.view import View
 from pneuarm.service.configuration.configuration import Configuration, rerun_url
 from pneuarm.service.daemon.viewer import has_display, open_viewer, start_server
+from pneuarm.service.network.endpoint import in_url
 from pneuarm.service.network.sessions import check_free
 from pneuarm.service.replay.telling import say, say_damage
 
@@ -24,7 +25,7 @@ def replay_in_rerun(
 ) -> int:
     """Serve the log to Rerun; with a display its window opens. Goes on until Ctrl-C."""
     bind, port = configuration.rerun.bind, configuration.rerun.port
-    check_free("--port", f"tcp/{bind}:{port}")
+    check_free("--port", f"tcp/{in_url(bind)}:{port}")
     server = start_server(configuration)
     try:
         url = rerun_url(configuration)

@@ -18,8 +18,9 @@ import numpy as np
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm, Array, Section
-from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
 from pneuarm.controllers.kinematics.constant_curvature import section_inverse, tip_transform
+from pneuarm.service.configuration.text_file import read_text
 
 MM, BAR = 1e-3, 1e5
 #: The experiment lengthens two chambers: the arm bends toward the third, here along x.
@@ -105,9 +106,10 @@ def read_table(path: Path | None = None) -> PrintedTable:
     """
     source = path or files("pneuarm.service.validation").joinpath("table1.csv")
     try:
-        rows = list(csv.DictReader(source.read_text().splitlines()))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{source} cannot be read: {error}") from error
+        text = source.read_text() if path is None else read_text(path)
+        rows = list(csv.DictReader(text.splitlines()))
+    except (InvalidInput, csv.Error) as error:
+        raise ConfigurationError(f"{source}: {error}") from error
     if not rows or tuple(rows[0]) != COLUMNS:
         found = ", ".join(str(key) for key in rows[0]) if rows else "no rows"
         raise ConfigurationError(f"{source}: found {found}; the columns are {', '.join(COLUMNS)}")

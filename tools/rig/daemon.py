@@ -64,8 +64,8 @@ def run_command(*arguments: str, **options: Any) -> "subprocess.CompletedProcess
 
 
 def assert_one_sentence(done: "subprocess.CompletedProcess[str]", *words: str) -> None:
-    """Check what a failed command says: status 1, one line on stderr with all of the words."""
-    assert done.returncode == 1, (done.returncode, done.stdout, done.stderr)
+    """Check a failed command: status 1, or 2 for its usage; one line on stderr with all words."""
+    assert done.returncode in (1, 2), (done.returncode, done.stdout, done.stderr)
     assert done.stderr.startswith("pneuarm: "), done.stderr
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stdout == ""

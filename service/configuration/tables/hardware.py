@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
-from pneuarm.hardware.tables.table import BAR, Table
+from pneuarm.hardware.tables.table import BAR, NotNegative, Table
 from pneuarm.service.configuration.devices import devices
 
 
@@ -59,10 +59,8 @@ class HardwareConfig(Table):
         ),
     ] = False
     supply_flow_max_bar_s: Annotated[
-        float,
+        NotNegative,
         Field(
-            ge=0,
-            allow_inf_nan=False,
             description="the sum of all chambers' rises in a second that the supply can feed. The "
             "guard shortens all rises by one factor to stay below it, falls are free. 0: a supply "
             "without limit",

@@ -1,21 +1,34 @@
 """Where the daemon listens, what it shows and what it writes down."""
 
+from ipaddress import ip_address
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from pneuarm.hardware.tables.table import Positive, Table
+from pneuarm.hardware.tables.table import NotNegative, PathText, Positive, Table
+from pneuarm.service.network.endpoint import Endpoint
 
-Endpoint = Annotated[
-    str, Field(pattern=r"^(tcp|tls|udp|quic|ws|unixsock-stream|unixpipe|serial|vsock)/[^\s]+$")
-]
+
+def _endpoint(text: str) -> str:
+    Endpoint.parse(text)
+    return text
+
+
+def _ip_address(text: str) -> str:
+    try:
+        ip_address(text)
+    except ValueError as error:
+        raise ValueError(
+            f"{text!r} is no IP address of this machine, such as 127.0.0.1, ::1 or 0.0.0.0"
+        ) from error
+    return text
 
 
 class ZenohConfig(Table):
     """Where the daemon listens; a Zenoh file goes first and may bring TLS and access control."""
 
     listen: Annotated[
-        tuple[Endpoint, ...],
+        tuple[Annotated[str, AfterValidator(_endpoint)], ...],
         Field(
             min_length=1,
             strict=False,
@@ -26,7 +39,7 @@ class ZenohConfig(Table):
         ),
     ] = ("tcp/127.0.0.1:7447",)
     config_file: Annotated[
-        str,
+        PathText,
         Field(
             description=(
                 "Zenoh's own configuration file (JSON5), for TLS and access control; empty: none. "
@@ -44,6 +57,7 @@ class RerunConfig(Table):
     )
     bind: Annotated[
         str,
+        AfterValidator(_ip_address),
         Field(
             description=(
                 "where Rerun's server listens; anything but loopback is said with a warning at the "
@@ -88,7 +102,7 @@ class LogConfig(Table):
     """The session log. ``directory`` empty means the user's state directory."""
 
     directory: Annotated[
-        str,
+        PathText,
         Field(
             description=(
                 "where sessions go; empty: `pneuarm/sessions` in the user's state directory; `~` is"
@@ -99,15 +113,16 @@ class LogConfig(Table):
     roll_mib: Annotated[
         Positive,
         Field(
-            description="a part that has grown to this size is followed by the next, without a gap"
+            ge=0.01,
+            description="a part that has grown to this size is followed by the next, without a gap",
         ),
     ] = 1024.0
-    roll_minutes: Annotated[Positive, Field(description="and so is one of this age")] = 60.0
+    roll_minutes: Annotated[Positive, Field(ge=0.01, description="and so is one of this age")] = (
+        60.0
+    )
     keep_gib: Annotated[
-        float,
+        NotNegative,
         Field(
-            ge=0,
-            allow_inf_nan=False,
             description=(
                 "delete the oldest finished parts beyond this total, whenever a part is opened; 0 "
                 "keeps everything"
@@ -115,8 +130,8 @@ class LogConfig(Table):
         ),
     ] = 0.0
     min_free_mib: Annotated[
-        float,
-        Field(ge=0, allow_inf_nan=False, description="with less free space, `enable` is refused"),
+        NotNegative,
+        Field(description="with less free space, `enable` is refused"),
     ] = 1024.0
     full_disk_vent_s: Annotated[
         float,

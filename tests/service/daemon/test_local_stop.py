@@ -1,64 +1,18 @@
-"""The lock on a device, and the stop past the network."""
+"""The stop past the network."""
 
 import contextlib
 import os
 import select
 import socket
-import subprocess
-import sys
 import threading
 
 import pytest
 
-from pneuarm.controllers.arm.errors import ConfigurationError, DaemonUnreachable, NotConfirmed
+from pneuarm.controllers.arm.errors import AlreadyInUse, DaemonUnreachable, NotConfirmed
 from pneuarm.service.daemon import local_stop
-from pneuarm.service.daemon.local_stop import Callers, lock, stop_locally
+from pneuarm.service.daemon.local_stop import Callers, listen, stop_locally
 
 NAME = f"test-lock-{os.getpid()}"
-
-
-def test_a_second_lock_is_refused_with_the_process_that_holds_it() -> None:
-    with lock("device", NAME):
-        with pytest.raises(ConfigurationError) as caught:
-            lock("device", NAME)
-        assert str(caught.value) == (
-            f"device {NAME!r} is in use by another pneuarm daemon (process {os.getpid()}); stop "
-            "that one first, or name another device"
-        )
-        lock("device", NAME + "-2").close()
-        lock("arm", NAME).close()  # the two kinds are apart
-    lock("device", NAME).close()
-
-
-HOLD_A_LOCK = """
-import sys
-from pneuarm.service.daemon.local_stop import lock
-held = lock("device", sys.argv[1])
-print(flush=True)
-sys.stdin.read()
-"""
-
-
-def test_the_lock_of_another_process_is_seen_and_goes_with_it_however_it_ends() -> None:
-    other = subprocess.Popen(
-        [sys.executable, "-c", HOLD_A_LOCK, NAME], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    assert other.stdout is not None
-    assert other.stdin is not None
-    other.stdout.readline()
-    with pytest.raises(ConfigurationError, match=rf"\(process {other.pid}\)"):
-        lock("device", NAME)
-    other.kill()
-    other.wait()
-    lock("device", NAME).close()
-    other.stdin.close()
-    other.stdout.close()
-
-
-def test_the_lock_does_not_leak_into_programs_that_are_started() -> None:
-    held = lock("device", NAME)
-    assert not os.get_inheritable(held.fileno())
-    held.close()
 
 
 class Answering:
@@ -67,7 +21,7 @@ class Answering:
     def __init__(self, answer: bytes | None) -> None:
         self.heard: list[bytes] = []
         self._answer = answer
-        self._listener = lock("arm", NAME)
+        self._listener = listen(NAME)
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
@@ -107,6 +61,12 @@ def test_anything_else_is_not_confirmed(answer: bytes | None) -> None:
     supervisor.end()
 
 
+def test_an_arm_has_one_listener() -> None:
+    with listen(NAME), pytest.raises(AlreadyInUse, match=NAME):
+        listen(NAME)
+    listen(NAME).close()
+
+
 def test_without_a_daemon_on_this_machine_it_says_so() -> None:
     with pytest.raises(DaemonUnreachable, match=f"no daemon for arm '{NAME}' runs") as caught:
         stop_locally(NAME)
@@ -114,12 +74,12 @@ def test_without_a_daemon_on_this_machine_it_says_so() -> None:
 
 
 def test_a_supervisor_that_is_stuck_does_not_hold_up_who_stops() -> None:
-    with lock("arm", NAME), pytest.raises(NotConfirmed):  # nobody accepts
+    with listen(NAME), pytest.raises(NotConfirmed):  # nobody accepts
         stop_locally(NAME)
 
 
 def test_a_stuck_supervisor_with_a_full_queue_neither() -> None:
-    held = lock("arm", NAME)
+    held = listen(NAME)
     others = []
     for _ in range(20):
         other = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -134,7 +94,7 @@ def test_a_stuck_supervisor_with_a_full_queue_neither() -> None:
 
 
 def test_connections_that_say_nothing_delay_no_stop() -> None:
-    with lock("arm", NAME) as listener, contextlib.ExitStack() as silent:
+    with listen(NAME) as listener, contextlib.ExitStack() as silent:
         callers = Callers(listener)
         stopped = threading.Event()
 
@@ -160,7 +120,7 @@ def test_connections_that_say_nothing_delay_no_stop() -> None:
 
 @pytest.mark.parametrize("said", [b"", b"x", b"e", b"GET / HTTP/1.1\r\n\r\n", b"\x00" * 4000])
 def test_who_asks_for_something_else_is_sent_away(said: bytes) -> None:
-    with lock("arm", NAME) as listener:
+    with listen(NAME) as listener:
         callers = Callers(listener)
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as other:
             other.connect(f"\0pneuarm/arm/{NAME}")

@@ -25,8 +25,8 @@ from pneuarm.logs.reading.replay_device import ReplayDevice
 from pneuarm.service.configuration import configuration as config
 from pneuarm.service.configuration import devices as devices_module
 from pneuarm.service.configuration.devices import devices
-from pneuarm.service.daemon.local_stop import lock
 from pneuarm.service.devices import registry as backends
+from pneuarm.service.processes.lock import lock
 from tests.logs.reading.test_replay_device import record
 from tools.rig.daemon import ROOT
 

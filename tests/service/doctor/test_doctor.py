@@ -11,11 +11,11 @@ import pytest
 from pneuarm.hardware.device import Bus
 from pneuarm.service.configuration.configuration import Configuration, load
 from pneuarm.service.control.clock import Wake
-from pneuarm.service.daemon.local_stop import lock
 from pneuarm.service.devices import registry
 from pneuarm.service.doctor import device, machine, places, rights, timing
 from pneuarm.service.doctor.command import examine
 from pneuarm.service.doctor.finding import Finding, Verdict, summary
+from pneuarm.service.processes.lock import lock
 from pneuarm.service.systemd.unit import unit_text
 from tools.rig.daemon import ROOT, Daemon, free_port, run_command
 

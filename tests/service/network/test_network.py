@@ -1,12 +1,15 @@
 """Endpoints: which are this machine's own, which are taken. No session is opened here."""
 
+import errno
+import os
 import socket
 from pathlib import Path
 
 import pytest
 
-from pneuarm.controllers.arm.errors import ConfigurationError
-from pneuarm.service.network.sessions import check_free, is_loopback, read_config
+from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
+from pneuarm.service.network.endpoint import Endpoint
+from pneuarm.service.network.sessions import check_free, open_connected, read_config
 
 
 @pytest.mark.parametrize(
@@ -28,7 +31,7 @@ from pneuarm.service.network.sessions import check_free, is_loopback, read_confi
     ],
 )
 def test_which_endpoints_are_reached_from_this_machine_only(endpoint: str, loopback: bool) -> None:
-    assert is_loopback(endpoint) == loopback
+    assert Endpoint.parse(endpoint).is_loopback == loopback
 
 
 @pytest.mark.parametrize("family", [socket.AF_INET, socket.AF_INET6])
@@ -43,12 +46,9 @@ def test_a_port_that_is_taken_is_refused_before_anything_starts(
         port = other.getsockname()[1]
         with pytest.raises(ConfigurationError) as caught:
             check_free("zenoh.listen", f"tcp/{shown}:{port}")
-        assert str(caught.value) == (
-            f"zenoh.listen: {shown}:{port} cannot be used (Address already in use); is another "
-            "daemon or viewer running there? choose another port"
-        )
+        for fact in ("zenoh.listen", f"{shown}:{port}", os.strerror(errno.EADDRINUSE)):
+            assert fact in str(caught.value)
     check_free("zenoh.listen", f"tcp/{shown}:{port}")
-    check_free("rerun.port", f"tcp/{host}:{port}")  # as the key `bind` has it
 
 
 def test_a_port_that_was_free_is_left_free() -> None:
@@ -60,30 +60,73 @@ def test_a_port_that_was_free_is_left_free() -> None:
 
 
 @pytest.mark.parametrize(
-    ("endpoint", "words"),
+    ("endpoint", "facts"),
     [
-        ("tcp/127.0.0.1:70000", "port 70000 of tcp/127.0.0.1:70000; allowed: 0 to 65535"),
-        ("tcp/192.0.2.1:7447", "192.0.2.1:7447 cannot be used (Cannot assign requested address)"),
+        ("tcp/127.0.0.1:70000", ("70000", "65535")),
+        ("tcp/192.0.2.1:7447", ("192.0.2.1:7447", os.strerror(errno.EADDRNOTAVAIL))),
+        ("tcp/nobody.invalid:7447", ("nobody.invalid:7447",)),
     ],
 )
-def test_an_address_that_is_none_of_ours_is_refused(endpoint: str, words: str) -> None:
+def test_an_address_that_is_none_of_ours_is_refused(endpoint: str, facts: tuple[str, ...]) -> None:
     with pytest.raises(ConfigurationError) as caught:
         check_free("zenoh.listen", endpoint)
-    assert str(caught.value).startswith(f"zenoh.listen: {words}")
+    assert all(fact in str(caught.value) for fact in ("zenoh.listen", *facts))
 
 
-@pytest.mark.parametrize("endpoint", ["udp/127.0.0.1:1", "unixpipe//x", "tcp/127.0.0.1", "tcp/a:²"])
+@pytest.mark.parametrize("endpoint", ["udp/127.0.0.1:1", "unixpipe//x"])
 def test_other_endpoints_are_zenohs_own_affair(endpoint: str) -> None:
     check_free("zenoh.listen", endpoint)
+
+
+#: What a person types for an address, and what the refusal must tell.
+NO_ADDRESS = {
+    "": "tcp/127.0.0.1:7447",
+    "127.0.0.1:7599": "'127.0.0.1:7599'",
+    "localhost": "'localhost'",
+    "tcp": "'tcp'",
+    "tcp/": "'tcp/'",
+    "tcp/:1": "'tcp/:1'",
+    "tcp/127.0.0.1": "port",
+    "tcp/127.0.0.1:": "port",
+    "tcp/127.0.0.1:99999": "65535",
+    "tcp/127.0.0.1:-1": "65535",
+    "tcp/127.0.0.1:" + "9" * 6000: "tcp/127.0.0.1:999",
+    "tcp/a:²": "port",
+    "tcp/::1:7447": "[::1]",
+    "tcp/[::1:7447": "[::1]",
+    "tcp/[zz::]:7447": "[::1]",
+    "http/127.0.0.1:1": "tls",
+    "tcp/a b:1": "'tcp/a b:1'",
+    "tcp/a\0b:1": r"'tcp/a\x00b:1'",
+    "tcp/a\n:1": r"'tcp/a\n:1'",
+    "tcp/" + "a" * 6000 + ":1": "tcp/aaa",
+    "tcp/\udcff:1": r"\udcff",
+    "/127.0.0.1:1": "tcp",
+}
+
+
+@pytest.mark.parametrize("text", NO_ADDRESS, ids=lambda text: ascii(text)[:30])
+def test_what_is_no_address_is_refused_with_it_and_what_one_is(text: str) -> None:
+    for read in (Endpoint.parse, open_connected):
+        with pytest.raises(InvalidInput) as refused:
+            read(text)
+        told = str(refused.value)
+        assert NO_ADDRESS[text] in told
+        assert len(told) < 400
+        assert told.isprintable()
 
 
 def test_a_zenoh_file_that_is_missing_or_wrong_is_refused(tmp_path: Path) -> None:
     missing = tmp_path / "zenoh.json5"
     with pytest.raises(ConfigurationError) as caught:
         read_config(str(missing))
-    assert str(caught.value) == f"zenoh.config_file = {str(missing)!r}: no such file"
+    assert "zenoh.config_file" in str(caught.value)
+    assert repr(str(missing)) in str(caught.value)
     missing.write_text("{ mode: 'octopus' ")
     with pytest.raises(ConfigurationError, match=r"^zenoh\.config_file = .*zenoh\.json5'"):
         read_config(str(missing))
+    for other in (str(tmp_path), "/dev/null", "a\0b", "x" * 5000):
+        with pytest.raises(ConfigurationError, match=r"^zenoh\.config_file = "):
+            read_config(other)
     missing.write_text("{ mode: 'peer' }")
     assert read_config(str(missing)).get_json("mode") == '"peer"'

@@ -190,7 +190,7 @@ def test_what_is_no_log_is_one_sentence(tmp_path: Path, command: str) -> None:
 
 def test_replay_refuses_a_speed_of_nothing_and_a_port_that_is_taken(log: LogReader) -> None:
     path = str(log.parts[0])
-    assert_one_sentence(run_command("replay", path, "--speed", "0"), "--speed 0")
+    assert_one_sentence(run_command("replay", path, "--speed", "0"), "--speed", "0")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
