@@ -101,3 +101,12 @@ def test_the_texts_of_every_event_name_its_level() -> None:
             for told in kept.events:
                 usual = pb.WARNING if event.name in serious else pb.INFO
                 assert told.level == (pb.ERROR if event == ModeEvent.FAULT else usual)
+
+
+def test_the_arming_timeout_itself_is_still_in_time() -> None:
+    kept = Kept(Mode.READY)
+    kept.ask(ModeEvent.ENABLE)
+    kept.keeper.watch(5.0 + TIMEOUTS.arming_s, conditions(target_age_s=None))
+    assert kept.keeper.mode == Mode.ACTIVE
+    kept.keeper.watch(5.001 + TIMEOUTS.arming_s, conditions(target_age_s=None))
+    assert kept.keeper.mode == Mode.HOLD
