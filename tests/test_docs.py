@@ -3,6 +3,7 @@
 import ast
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -174,12 +175,20 @@ def test_python_on_a_page_compiles(page: Path) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_every_room_stands_in_the_drawing_of_the_house(package: str) -> None:
+def test_the_drawing_of_the_house_has_the_floors_of_the_contracts(package: str) -> None:
     (drawing,) = re.findall(
-        rf"^    {package} .*?(?=^    -----|^$)", (DOCS / "architecture.md").read_text(), re.M | re.S
+        rf"^    {package} (.*?)(?=^    -----|^$)",
+        (DOCS / "architecture.md").read_text(),
+        re.M | re.S,
     )
-    rooms = {init.parent.name for init in (ROOT / package).glob("*/__init__.py")}
-    assert rooms <= set(re.findall(r"\w+", drawing))
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    (layers,) = (
+        contract["layers"]
+        for contract in settings["contracts"]
+        if contract.get("containers") == [f"pneuarm.{package}"]
+    )
+    drawn = [set(re.findall(r"\w+", row)) for row in drawing.strip().splitlines()]
+    assert drawn == [set(re.findall(r"\w+", layer)) for layer in layers]
 
 
 # --- what is named exists ------------------------------------------------------------------------

@@ -12,6 +12,7 @@ class LengthLimit(Limit):
     """Keeps every length strictly inside the open interval of Eq. (4)."""
 
     name, bit = "length", 1
+    words = "length, Eq. (4)"
     margin_m = 1e-7
     convex = two_sided = in_workspace = True
 

@@ -19,7 +19,7 @@ from pneuarm.hardware.transports.modbus_server import ServedTerminal
 from pneuarm.service.configuration.configuration import Configuration, check, load
 from pneuarm.service.devices.process import WARM_UP_COMMANDS, DeviceProcess
 from pneuarm.service.processes.device_slots import DeviceLink, DeviceWatch, LinkedDevice, LinkState
-from tests.hardware.festo_bench import WATCHDOG
+from tests.hardware.festo.festo_bench import WATCHDOG
 
 SOME_PA = np.array([[2e4, -1e4, 1e4]])
 ZEROS = np.zeros((1, 3))
