@@ -33,7 +33,8 @@ def main() -> None:
             raise
         raise SystemExit(
             "pneuarm: only the client is installed here, `from pneuarm import Client`; the daemon "
-            f"and the commands come with `pip install pneuarm=={__version__}`"
+            "and the commands come with `pip install ./distributions/client .` in the checkout of "
+            f"pneuarm {__version__}"
         ) from None
     raise SystemExit(command())
 
