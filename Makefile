@@ -62,7 +62,7 @@ bench: bench-setup
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 
-# The tables of docs/ that stand in the code: keys, messages, faults, modes.
+# The tables of docs/ that stand in the code: keys, messages, configuration, faults, modes, rooms.
 docs: setup
 	$(BIN)/python -m tools.docs
 
