@@ -33,14 +33,16 @@ def quaternion_from_rotation(rotation: Array) -> Array:
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()  # plain floats: it runs in every tick
     squares = (1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i, 1.0 + a + e + i)
     # Dividing by the largest of the four keeps full precision at every angle.
-    rows = (
-        (squares[0], b + d, c + g, h - f),
-        (b + d, squares[1], f + h, c - g),
-        (c + g, f + h, squares[2], d - b),
-        (h - f, c - g, d - b, squares[3]),
-    )
-    row = rows[squares.index(max(squares))]
-    x, y, z, w = row
+    largest = max(squares)
+    match squares.index(largest):
+        case 0:
+            x, y, z, w = largest, b + d, c + g, h - f
+        case 1:
+            x, y, z, w = b + d, largest, f + h, c - g
+        case 2:
+            x, y, z, w = c + g, f + h, largest, d - b
+        case _:
+            x, y, z, w = h - f, c - g, d - b, largest
     norm = math.copysign(math.sqrt(x * x + y * y + z * z + w * w), w)
     return np.array((x / norm, y / norm, z / norm, w / norm))
 

@@ -11,7 +11,7 @@ from pneuarm.controllers.arm.errors import CalibrationError, ConfigurationError,
 from pneuarm.controllers.calibration.recording import Recording, fresh_tips, joined
 from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.logs.reading.reader import LogReader
-from pneuarm.service.configuration.configuration import Configuration, check
+from pneuarm.service.configuration.configuration import Configuration, recorded
 
 #: What is needed of a tick; all of them, of hours, would fill the memory.
 _NEEDED = (
@@ -73,7 +73,7 @@ def read_logs(paths: Sequence[Path], name: str | None) -> tuple[Configuration, R
 def _configuration(reader: LogReader) -> Configuration:
     path = reader.parts[0]
     try:
-        return check(tomllib.loads(reader.info.config_toml), str(path))
+        return recorded(reader.info.config_toml, str(path))
     except (ConfigurationError, tomllib.TOMLDecodeError) as error:
         raise LogError(f"{path} holds a configuration that is not read here: {error}") from error
 

@@ -30,7 +30,7 @@ from pneuarm.service.configuration.tables.control import ControlConfig
 from pneuarm.service.configuration.tables.feedback import FeedbackConfig, ReferenceConfig
 from pneuarm.service.configuration.tables.frames import FramesConfig
 from pneuarm.service.configuration.tables.hardware import HardwareConfig
-from pneuarm.service.configuration.tables.monitors import MonitorsConfig
+from pneuarm.service.configuration.tables.monitors import MOVED, MonitorsConfig, moved
 from pneuarm.service.configuration.tables.outputs import LogConfig, RerunConfig, ZenohConfig
 
 PRESETS = ("paper", "table1", "trunk")
@@ -162,6 +162,14 @@ def check(tables: dict[str, Any], where: str = "configuration") -> Configuration
     return configuration
 
 
+def recorded(toml: str, where: str) -> Configuration:
+    """Check the configuration of a session, maybe of before a key moved; ConfigurationError."""
+    tables = tomllib.loads(toml)
+    if isinstance(tables.get("monitors"), dict):
+        tables["monitors"] = moved(tables["monitors"])
+    return check(tables, where)
+
+
 def _read(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text())
@@ -189,6 +197,9 @@ def _sentence(item: Any) -> str:
         for broken in devices().broken.values():
             if item["loc"] == (broken.name.replace("-", "_"),):
                 return f"{key}: {broken}"
+        table, _, name = key.partition(".")
+        if table == "monitors" and name in MOVED:
+            return f"{key}: no such key; it has moved to monitors.{MOVED[name]}"
         return f"{key}: no such key; allowed here: {', '.join(_keys_beside(item['loc']))}"
     if item["type"] == "missing":
         return f"{key} is missing"

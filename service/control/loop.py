@@ -19,7 +19,7 @@ from pneuarm.hardware.interface import Hardware, Measurement
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration
-from pneuarm.service.configuration.monitor_settings import MonitorSettings
+from pneuarm.service.configuration.tables.monitors import MonitorsConfig
 from pneuarm.service.control.record import (
     Estimate,
     GuardCounts,
@@ -31,6 +31,7 @@ from pneuarm.service.control.record import (
 from pneuarm.service.control.steering import Steering
 from pneuarm.service.modes.mode import VENTED_MODES, Mode, ModeEvent
 from pneuarm.service.modes.mode_keeper import Conditions, ModeKeeper, Notice, Timeouts
+from pneuarm.service.monitors.measurement_age import measurement_age_s
 from pneuarm.service.processes.device_slots import LinkedDevice
 from pneuarm.service.processes.pipe import (
     Command,
@@ -40,7 +41,6 @@ from pneuarm.service.processes.pipe import (
     SetTarget,
     SetTipPose,
 )
-from pneuarm.service.safety.monitors.watch import measurement_age_s
 from pneuarm.service.safety.safety import Safety
 
 #: Gauge pressure below which a chamber counts as vented, Pa: ten times the sensors' noise.
@@ -54,7 +54,7 @@ class LoopSettings:
     period_s: float
     control: ControlSettings
     timeouts: Timeouts
-    monitors: MonitorSettings
+    monitors: MonitorsConfig
     start_ns: int
     start_unix_ns: int
     supply_flow_max_pa_s: float = inf
@@ -70,7 +70,7 @@ class LoopSettings:
             period_s=1.0 / configuration.control.rate_hz,
             control=configuration.control.settings(),
             timeouts=timeouts,
-            monitors=configuration.monitors.settings(),
+            monitors=configuration.monitors,
             start_ns=start_ns,
             start_unix_ns=start_unix_ns,
             supply_flow_max_pa_s=configuration.hardware.supply_flow_limit_pa_s,

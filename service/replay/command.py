@@ -3,13 +3,12 @@
 import argparse
 import dataclasses
 import json
-import tomllib
 from datetime import UTC, datetime
 
 from pneuarm.controllers.arm.errors import InvalidInput, LogError
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.summary import LogSummary, summarise
-from pneuarm.service.configuration.configuration import Configuration, check
+from pneuarm.service.configuration.configuration import Configuration, recorded
 
 #: Places that are named; there may be thousands.
 _DAMAGE_LINES = 20
@@ -23,7 +22,7 @@ def recorded_configuration(reader: LogReader) -> Configuration:
             f"{path} lacks the configuration with which it was recorded: every copy in it is "
             "damaged; its ticks can be read, and replayed with --to zenoh"
         )
-    return check(tomllib.loads(reader.info.config_toml), str(path))
+    return recorded(reader.info.config_toml, str(path))
 
 
 def info(arguments: argparse.Namespace) -> int:

@@ -1,1 +1,1 @@
-"""What counts as a fault, and what follows: monitors, the table of faults, the ramp. Pure."""
+"""What follows from a fault: the table of faults, what is there now, the ramp down. Pure."""

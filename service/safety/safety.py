@@ -2,30 +2,54 @@
 
 import math
 
+import numpy as np
+
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.interface import Measurement
-from pneuarm.service.configuration.monitor_settings import MonitorSettings
+from pneuarm.hardware.tables.table import BAR
+from pneuarm.service.configuration.tables.monitors import MonitorsConfig
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.modes.mode_keeper import ModeKeeper
+from pneuarm.service.monitors.measurement_age import DeviceLost
+from pneuarm.service.monitors.model_contradicted import TipModel
+from pneuarm.service.monitors.monitors import Monitors
 from pneuarm.service.processes.pipe import SetTipPose
 from pneuarm.service.safety.fault_keeper import FaultKeeper
-from pneuarm.service.safety.faults import FaultCode
-from pneuarm.service.safety.monitors.tip_model import TipModel
-from pneuarm.service.safety.monitors.watch import Watch
-from pneuarm.service.safety.ramp import Ramp
+from pneuarm.service.safety.faults import TICK_FAILED
+
+
+class Ramp:
+    """All pressures to zero in proportion, none faster than a rate; over after a fixed time.
+
+    In proportion, so that the arm straightens the way it is bent. Only time moves it: whatever the
+    device answers, it ends.
+    """
+
+    def __init__(self, start_pa: Array, rate_pa_s: float, now_s: float) -> None:
+        self._start_pa = np.where(np.isfinite(start_pa), start_pa, 0.0)
+        self._begin_s = now_s
+        self._duration_s = float(np.abs(self._start_pa).max()) / rate_pa_s
+
+    def over(self, now_s: float) -> bool:
+        """Whether zero is reached."""
+        return now_s - self._begin_s >= self._duration_s
+
+    def pressures_pa(self, now_s: float) -> Array:
+        """Pressures (n_sections, 3) wanted at a time before the end."""
+        return self._start_pa * (1.0 - (now_s - self._begin_s) / self._duration_s)
 
 
 class Safety:
     """Lets the monitors look once a tick, and their faults change the mode."""
 
-    def __init__(self, arm: Arm, settings: MonitorSettings, keeper: ModeKeeper) -> None:
+    def __init__(self, arm: Arm, config: MonitorsConfig, keeper: ModeKeeper) -> None:
         self._keeper = keeper
         self._faults = FaultKeeper(keeper)
-        self._watch = Watch(arm, settings)
+        self._monitors = Monitors(arm, config.keys_of_monitors())
         self._tip_model = TipModel(arm)
         slowest = float(arm.per_chamber("pressure_slew_max_pa_s").min())
-        self._ramp_pa_s = min(settings.ramp_pa_s, slowest)
+        self._ramp_pa_s = min(config.ramp_bar_s * BAR, slowest)
         self._ramp: Ramp | None = None
 
     @property
@@ -50,7 +74,7 @@ class Safety:
             tip_error_m = self._tip_model.error_m(
                 tip_pose.position_m, tip_pose.received_ns, measurement.pressures_pa, now_ns
             )
-        found = self._watch.look(
+        found = self._monitors.look(
             measurement, sent_pa, estimated_m, tip_error_m, before, now_s, dt_s, overruns
         )
         self._faults.seen(found, now_s)
@@ -65,7 +89,7 @@ class Safety:
         """Latch the fault of a call or a tick that failed; the loop has vented already."""
         lost = isinstance(error, HardwareError | OSError)
         self._ramp = None
-        self._faults.failed(FaultCode.DEVICE_LOST if lost else FaultCode.TICK_FAILED, cause, now_s)
+        self._faults.failed(DeviceLost.fault if lost else TICK_FAILED, cause, now_s)
 
     def worked(self) -> None:
         """A whole tick went through."""

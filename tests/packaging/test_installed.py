@@ -41,7 +41,8 @@ def test_both_installed_run_the_demo_and_read_its_log(
     assert logs
     told = json.loads(run(str(programs / "pneuarm"), "info", str(logs[0]), "--json", cwd=tmp_path))
     assert (told["arm"], told["missing_ticks"]) == ("paper", 0)
-    where = run(str(programs / "python"), "-c", "import pneuarm; print(pneuarm.__file__)")
+    program = "import pneuarm; print(pneuarm.__file__)"
+    where = run(str(programs / "python"), "-c", program, cwd=tmp_path)
     assert Path(where.strip()).is_relative_to(tmp_path)
 
 

@@ -10,7 +10,7 @@ from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import TOPICS, Topic
 from pneuarm.service.modes.mode import ModeEvent
-from pneuarm.service.safety.faults import FaultCode
+from pneuarm.service.safety.faults import FAULTS
 from tools.docs.regions import NoSuchTable, linked, table
 
 PROTO = Path(__file__).resolve().parents[2] / "logs" / "schema" / "pneuarm.proto"
@@ -168,5 +168,5 @@ def _message(message: type) -> str:
 def make_codes(name: str) -> str:
     """Return the codes of events that come from the tables of modes and faults."""
     modes = ", ".join(f"`{event.name.lower()}`" for event in ModeEvent)
-    faults = ", ".join(f"`{code.name.lower()}`" for code in FaultCode)
+    faults = ", ".join(f"`{code}`" for code in FAULTS)
     return f"Codes of the modes: {modes}.\n\nCodes of the faults: {faults}."

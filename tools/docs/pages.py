@@ -19,33 +19,21 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "codes": messages.make_codes,
     "modes": tables.make_modes,
     "faults": tables.make_faults,
+    "monitors": tables.make_monitors,
     "exceptions": tables.make_exceptions,
     "rooms": tables.make_rooms,
     "simulator": tables.make_simulator,
 }
 
 
-def make(name: str, there: str = "") -> str:
-    """Return a table in the place of what is there; raises NoSuchTable where nothing makes it."""
+def make(name: str) -> str:
+    """Return a table by its name; raises NoSuchTable where nothing makes it."""
     maker = MAKERS.get(name.split()[0])
     if maker is None:
         raise NoSuchTable(f"nothing makes {name!r}; there are {', '.join(MAKERS)}")
-    made = maker(name)
-    return _kept(made, there) if maker is configuration.make else made
+    return maker(name)
 
 
 def fresh(page: str) -> str:
     """Return a page with all of its tables made anew."""
     return filled(page, make)
-
-
-def _kept(made: str, there: str) -> str:
-    """Keep what is said of a key that says nothing of itself yet."""
-    old = {line.split(" | ")[0]: line for line in there.splitlines() if line.startswith("| `")}
-    lines = []
-    for line in made.splitlines():
-        before = old.get(line.split(" | ")[0], "")
-        if line.endswith("| |") and not before.endswith("| |") and before:
-            line = f"{line.removesuffix('| |')}| {before.rstrip('| ').rpartition(' | ')[2]} |"
-        lines.append(line)
-    return "\n".join(lines)

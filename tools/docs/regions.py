@@ -10,7 +10,7 @@ Everything else on a page is written by hand, and left as it is.
 import re
 from collections.abc import Callable, Sequence
 
-_PLACE = re.compile(r"(<!-- made by make docs: ([^>]+?) -->\n)(.*?)(<!-- end -->)", re.S)
+_PLACE = re.compile(r"(<!-- made by make docs: ([^>]+?) -->\n).*?(<!-- end -->)", re.S)
 
 
 class NoSuchTable(ValueError):
@@ -19,14 +19,12 @@ class NoSuchTable(ValueError):
 
 def names(page: str) -> list[str]:
     """Names of what a page asks for, in its order."""
-    return [name for _, name, _, _ in _PLACE.findall(page)]
+    return [name for _, name, _ in _PLACE.findall(page)]
 
 
-def filled(page: str, make: Callable[[str, str], str]) -> str:
-    """Return the page with every place made anew of its name and of what stands there."""
-    return _PLACE.sub(
-        lambda found: f"{found[1]}{_spaced(make(found[2], found[3]))}{found[4]}", page
-    )
+def filled(page: str, make: Callable[[str], str]) -> str:
+    """Return the page with every place made anew of its name."""
+    return _PLACE.sub(lambda found: f"{found[1]}{_spaced(make(found[2]))}{found[3]}", page)
 
 
 def _spaced(text: str) -> str:
@@ -34,10 +32,10 @@ def _spaced(text: str) -> str:
     return f"\n{text.strip()}\n\n"
 
 
-def linked(text: str) -> str:
-    """Return the text with links for pages, and for tables of the configuration."""
+def linked(text: str, page: str = "") -> str:
+    """Return the text with links for pages, and for tables of the configuration on ``page``."""
     text = re.sub(r"docs/(\w+\.md)(#[\w-]+)?", r"[\1](\1\2)", text)
-    return re.sub(r"`(\[+([a-z0-9_.]+)\]+)`", lambda m: f"[`{m[1]}`](#{_anchor(m[2])})", text)
+    return re.sub(r"`(\[+([a-z0-9_.]+)\]+)`", lambda m: f"[`{m[1]}`]({page}#{_anchor(m[2])})", text)
 
 
 def _anchor(path: str) -> str:

@@ -9,7 +9,8 @@ from pneuarm.controllers.arm import errors
 from pneuarm.hardware.simulator.parameters import SimulatorParameters
 from pneuarm.service.configuration.configuration import PRESETS, load
 from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
-from pneuarm.service.safety.faults import FAULTS, FaultCode
+from pneuarm.service.monitors.monitors import MONITORS
+from pneuarm.service.safety.faults import FAULTS
 from tools.docs.regions import linked, table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -30,11 +31,20 @@ def make_modes(name: str) -> str:
 def make_faults(name: str) -> str:
     """Return every fault with its bit, its policy, its cause, what follows, and the remedy."""
     rows = []
-    for code in FaultCode:
-        fault = FAULTS[code]
-        words = [fault.policy.name.lower(), fault.cause, fault.consequence, fault.remedy]
-        rows.append([f"`{code.name.lower()}`", f"{1 << code}", *words])
+    for fault in FAULTS.values():
+        policy = fault.policy
+        words = [policy.name.lower(), fault.cause, policy.consequence, fault.remedy]
+        rows.append([f"`{fault.code}`", f"{1 << fault.bit}", *words])
     return table(("code", "bit", "policy", "cause", "consequence", "remedy"), rows)
+
+
+def make_monitors(name: str) -> str:
+    """Return what each monitor looks at, and how to set it, by the code of its fault."""
+    rows = [
+        [f"`{kind.fault.code}`", kind.looks_at, linked(kind.how_to_set, "configuration.md")]
+        for kind in MONITORS
+    ]
+    return table(("code", "looks at", "how to set it"), rows)
 
 
 def make_exceptions(name: str) -> str:

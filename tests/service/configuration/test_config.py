@@ -24,8 +24,10 @@ from pneuarm.service.configuration.configuration import (
     check,
     load,
     log_directory,
+    recorded,
     rerun_url,
 )
+from pneuarm.service.configuration.tables.monitors import MOVED
 from pneuarm.service.devices import registry
 
 SECTION = load().model_dump()["arm"]["sections"][0]
@@ -115,6 +117,28 @@ def test_an_unknown_key_is_refused_with_those_there_are(
     (line,) = refusals(tmp_path, text)
     assert line.split(":")[0] == key
     assert beside in re.findall(r"\w+", line)
+
+
+@pytest.mark.parametrize("old", MOVED)
+def test_a_key_that_has_moved_is_refused_with_its_new_place(tmp_path: Path, old: str) -> None:
+    (line,) = refusals(tmp_path, f"[monitors]\n{old} = 20.0")
+    assert line.split(":")[0] == f"monitors.{old}"
+    assert f"monitors.{MOVED[old]}" in re.findall(r"[\w.]+", line)
+    table, _, name = MOVED[old].partition(".")
+    assert name in type(getattr(load().monitors, table)).model_fields
+
+
+def test_a_session_from_before_a_key_moved_is_read_with_its_values() -> None:
+    now = load().model_dump(exclude_none=True)
+    before = {old: 20.0 + number / 64.0 for number, old in enumerate(MOVED)}
+    before["supply_margin_bar"] = 0.5
+    text = tomli_w.dumps(now | {"monitors": before | {"ramp_bar_s": 0.7}})
+    monitors = recorded(text, "session.mcap").monitors
+    assert monitors.ramp_bar_s == 0.7
+    for old, place in MOVED.items():
+        table, _, name = place.partition(".")
+        assert getattr(getattr(monitors, table), name) == before[old]
+    assert recorded(tomli_w.dumps(now), "session.mcap") == load()
 
 
 def test_an_unknown_key_of_a_section_too(tmp_path: Path) -> None:

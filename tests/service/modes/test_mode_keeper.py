@@ -146,7 +146,7 @@ def test_a_disk_that_fills_during_a_hold_leaves_its_time_too() -> None:
 def test_enabling_is_refused_where_the_session_could_not_be_recorded(disk: Disk) -> None:
     kept = Kept()
     kept.after(0.02, replace(WELL, disk=disk))
-    assert "too little free space" in kept.ask(ModeEvent.ENABLE)
+    assert "log.min_free_mib" in kept.ask(ModeEvent.ENABLE)
     assert kept.mode == Mode.READY
     assert (kept.events[-1].code, kept.events[-1].client_id) == ("mode_refused", "me")
     kept.after(0.01)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pneuarm.service.safety.ramp import Ramp
+from pneuarm.service.safety.safety import Ramp
 
 PRESSURES = st.lists(st.floats(-1e5, 1e5), min_size=3, max_size=3)
 

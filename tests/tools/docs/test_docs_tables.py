@@ -19,9 +19,9 @@ prose = st.text().filter(lambda text: "<!--" not in text)
 @given(prose, prose, st.sampled_from(["", "old\n", "| a |\n\n"]))
 def test_only_what_stands_in_a_place_is_written(before: str, after: str, old: str) -> None:
     page = f"{before}{PLACE.format('x y', old)}{after}"
-    made = filled(page, lambda name, there: f"[{name}]")
+    made = filled(page, lambda name: f"[{name}]")
     assert made == f"{before}{PLACE.format('x y', chr(10) + '[x y]' + chr(10) * 2)}{after}"
-    assert filled(made, lambda name, there: f"[{name}]") == made
+    assert filled(made, lambda name: f"[{name}]") == made
     assert names(made) == ["x y"]
 
 

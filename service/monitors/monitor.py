@@ -1,10 +1,22 @@
 """What a monitor is, what it looks at, and how long something must last to count."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Any, ClassVar
 
+from pydantic import Field
+
+from pneuarm.controllers.arm.arm import Arm
+from pneuarm.hardware.tables.table import Table
 from pneuarm.service.modes.mode import Mode
-from pneuarm.service.safety.faults import FaultCode
+from pneuarm.service.monitors.fault import Fault
+
+MS, PERCENT = 1e-3, 0.01
+
+#: For how long something must be so without a break to count.
+Lasting = Annotated[
+    float, Field(ge=0, le=10000, description="for how long without a break, to be a fault")
+]
 
 
 @dataclass(slots=True)  # made in every tick: freezing it would cost more than all of its use
@@ -33,14 +45,26 @@ class Observation:
     stop_pressed: bool
 
 
-class Monitor(Protocol):
-    """Looks for one fault."""
+class Monitor(ABC):
+    """Looks for one fault. A kind of monitor is a subclass, and a line in the list of them.
 
-    code: FaultCode
+    ``looks_at`` and ``how_to_set`` are its row in docs/safety.md. ``keys`` are those of the table
+    ``[monitors.CODE]`` of a configuration, with CODE that of the fault; without keys there is none.
+    One that ``needs_fresh`` compares a measurement with the present: it looks at no old one.
+    """
 
+    fault: ClassVar[Fault]
+    looks_at: ClassVar[str]
+    how_to_set: ClassVar[str] = ""
+    keys: ClassVar[type[Table]] = Table
+    needs_fresh: ClassVar[bool] = True
+
+    def __init__(self, arm: Arm, keys: Any) -> None:  # noqa: B027 - some need neither
+        """Prepare to look at ``arm``; ``keys`` is an instance of the class of that name."""
+
+    @abstractmethod
     def look(self, seen: Observation) -> str:
         """Return what is wrong in words, or an empty string. Called once a tick."""
-        ...
 
 
 class Persistence:

@@ -1,0 +1,1 @@
+"""Monitors: a file each, with its fault, its keys and how it looks. Pure; time is an argument."""
