@@ -11,6 +11,7 @@ from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.detour import Detour
 from pneuarm.controllers.reach.reach import Progress, Reach
 from pneuarm.controllers.targets.chambers import LengthsTarget
+from pneuarm.controllers.targets.same import same
 from pneuarm.controllers.targets.target import LawName, Target
 
 #: Lengths this near to the goal of the way round (m) are there.
@@ -46,6 +47,7 @@ class Controller:
         # The way round is judged by the lengths: the tip may go away from its target first.
         self._way = Progress(AT_GOAL_M, 0.0, settings.stalled_rate_m_s, settings.stalled_time_s)
         self._target: Target | None = None
+        self._judged: Target | None = None  # the first of those that ask for the same
         self._awaited = self._sends_pressures = False
         self._offset_m, self._turn = np.zeros(3), np.eye(3)
         # Of the vented arm as it hangs, until it is started from something.
@@ -104,8 +106,9 @@ class Controller:
         A target that is only on the way, ``moving``, is never reached nor out of reach. While the
         arm itself is still ``awaited`` there, the target is not reached by the command alone.
         """
-        if moving or target is None or not _same(target, self._target):
+        if moving or target is None or not same(target, self._judged):
             self._progress.start()
+            self._judged = target
         self._target, self._awaited = target, awaited
         self._detour.set_target(target, self._offset_m)
         if target is None:
@@ -183,26 +186,3 @@ class Controller:
     def binding(self) -> int:
         """Return the bits of the limits that the commanded lengths are at."""
         return self._limits.binding(self.lengths_m)
-
-
-def _same(one: Target, other: Target | None) -> bool:
-    """Whether two targets ask for the same."""
-    if one is other:
-        return True
-    if type(one) is not type(other):
-        return False
-    mine, others = vars(one).values(), vars(other).values()
-    return all(_equal(a, b) for a, b in zip(mine, others, strict=True))
-
-
-def _equal(one: object, other: object) -> bool:
-    if one is other:
-        return True
-    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return one.shape == other.shape and bool((one == other).all())
-    if isinstance(one, tuple) and isinstance(other, tuple):
-        pairs = zip(one, other, strict=False)
-        return len(one) == len(other) and all(
-            _same(a, b) if isinstance(a, Target) else _equal(a, b) for a, b in pairs
-        )
-    return type(one) is type(other) and one == other

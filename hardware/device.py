@@ -4,6 +4,7 @@ The daemon, `doctor`, `emulate` and the unit file ask these objects and know no 
 They are made in every process: a device's own libraries are imported where they are used.
 """
 
+import math
 import os
 import socket
 from abc import ABC, abstractmethod
@@ -111,6 +112,14 @@ class Device(ABC, Generic[Config]):
 
         Empty only where the device zeroes its outputs by itself when its host falls silent.
         """
+
+    def watchdog_s(self, config: Config) -> float:
+        """Return after how long a silence of its host the device zeroes its outputs by itself.
+
+        Infinite where it does not, or where nobody knows. After half of it without an exchange
+        the device counts as lost.
+        """
+        return math.inf
 
 
 class EmulatedDevice(Device[Config]):

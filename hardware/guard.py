@@ -35,22 +35,38 @@ class Guarded:
 class Guard:
     """Turns any command into one that is allowed now.
 
-    The slew counts from the last write that the device acknowledged, :meth:`acknowledge`. Venting
-    goes past the guard: it is always allowed, at any speed. ``supply_flow_max_pa_s`` limits the
-    sum of all rises in a second, for a supply that cannot feed every chamber at full slew.
+    The slew counts from the last write that the device acknowledged, :meth:`acknowledge`, for
+    ``max_elapsed_s`` at most. Venting goes past the guard: it is always allowed, at any speed.
+    ``supply_flow_max_pa_s`` limits the sum of all rises in a second, for a supply that cannot feed
+    every chamber at full slew.
     """
 
     #: A command older than this many periods, or than this time, whichever is longer, is void.
     MAX_AGE_PERIODS = 3.0
     MAX_AGE_S = 0.05
 
-    def __init__(self, arm: Arm, period_s: float, supply_flow_max_pa_s: float = inf) -> None:
+    #: However long nothing was written, a write changes by what the slew allows in this many
+    #: periods at most: what was saved up in a gap would be one step.
+    MAX_ELAPSED_PERIODS = 4.0
+
+    def __init__(
+        self,
+        arm: Arm,
+        period_s: float,
+        supply_flow_max_pa_s: float = inf,
+        exchange_period_s: float = 0.0,
+    ) -> None:
+        """Make the guard of an arm whose commands come every ``period_s``.
+
+        ``exchange_period_s`` is the time between two writes where they come less often.
+        """
         self._low = arm.per_chamber("pressure_min_pa")
         self._high = arm.per_chamber("pressure_max_pa")
         self._slew = arm.per_chamber("pressure_slew_max_pa_s")
         self._flow_max_pa_s = supply_flow_max_pa_s
         self._max_age_s = max(self.MAX_AGE_PERIODS * period_s, self.MAX_AGE_S)
         self._period_s = period_s
+        self.max_elapsed_s = self.MAX_ELAPSED_PERIODS * max(period_s, exchange_period_s)
         self._sent = np.zeros_like(self._low)
         self._sent_at_s: float | None = None
 
@@ -93,10 +109,10 @@ class Guard:
         return self._in_range(wanted - rises * (1.0 - largest / needed))
 
     def _elapsed_s(self, now_s: float) -> float:
-        """Time since the last acknowledged write; one period before the first."""
+        """Time since the last acknowledged write, a few periods at most; one before the first."""
         if self._sent_at_s is None:
             return self._period_s
-        return max(0.0, now_s - self._sent_at_s)
+        return min(max(0.0, now_s - self._sent_at_s), self.max_elapsed_s)
 
     def acknowledge(self, pressures_pa: Array, at_s: float) -> None:
         """Remember what the device took, as the start of the next slew.

@@ -5,6 +5,9 @@ arm's response, and what a measured tip pose differs from the predicted one *of 
 was taken* is the disturbance: droop, hysteresis, creep, wrong coefficients. Filtered, it is the
 correction with which the laws see the tip. The prediction is of what was really commanded, so
 nothing winds up where the arm cannot follow.
+
+A sensor may lie, so it moves the command by a bounded amount only: the correction has a largest
+size, and a tip that does not go along with the model's is not followed at all.
 """
 
 import math
@@ -14,6 +17,7 @@ from enum import Enum, auto
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.feedback.goes_along import GoesAlong
 from pneuarm.controllers.feedback.prediction import Prediction
 from pneuarm.controllers.geometry.rotations import (
     quaternion_from_rotation,
@@ -31,6 +35,9 @@ _QUICK_S, _SLOW_S, _STILL_M = 0.03, 0.2, 2e-4
 #: The correction of a tip that stands still goes so many times faster.
 _WHEN_STILL = 2.0
 
+#: A correction that was at its largest no longer is below this share of it.
+_BACK_SHARE = 0.9
+
 #: An estimate is never told to be better than this (m): no camera sees an arm more exactly.
 _LEAST_SIGMA_M = 5e-5
 
@@ -41,7 +48,9 @@ class FeedbackSettings:
 
     ``delay_s`` is the age of a pose when it arrives; after ``timeout_s`` without one the camera
     counts as lost. A pose that is more than ``jump_max_m`` off the ones before is refused until
-    such poses have agreed with each other for ``jump_accept_s``.
+    such poses have agreed with each other for ``jump_accept_s``. The correction is at most
+    ``offset_max_share`` of the arm's length and ``turn_max_rad``. Where the model's tip moves by
+    ``still_max_m`` and the measured one does not, no pose is believed until it does.
     """
 
     enabled: bool = True
@@ -52,6 +61,9 @@ class FeedbackSettings:
     deadband_m: float = 1e-4
     jump_max_m: float = 0.02
     jump_accept_s: float = 0.5
+    offset_max_share: float = 0.25
+    turn_max_rad: float = 0.25 * math.pi
+    still_max_m: float = 0.01
     model_sigma_m: float = 0.025
     length_sigma_m: float = 0.01
     dither_pa: float = 1500.0
@@ -66,6 +78,8 @@ class Verdict(Enum):
     TAKEN = auto()
     REFUSED = auto()
     ACCEPTED_ANEW = auto()
+    NOT_ALONG = auto()
+    LATE = auto()
 
 
 class TipObserver:
@@ -82,9 +96,18 @@ class TipObserver:
         self.offset_m, self.rotation = np.zeros(3), np.eye(3)
         self.quaternion_xyzw = quaternion_from_rotation(self.rotation)
         self.seen = False
+        #: Whether the measured tip asks for a larger correction than is allowed.
+        self.limited = False
         self.refused = 0
+        self.offset_max_m = settings.offset_max_share * float(arm.rest_lengths_m.mean(axis=1).sum())
+        self._along = GoesAlong(settings.still_max_m)
+        #: Differences (3,) when the tip last went along with the model's, and the time before.
+        self._trusted, self._trusted_before = self.offset_m, self.offset_m
+        self._returns = self._turn_limited = False
+        self._beyond_m = 0.0
         self._turn = np.zeros(3)
         self._residual, self._fast = np.zeros(3), np.zeros(3)
+        self._wanted = self._fast
         self._variance_m2 = settings.model_sigma_m**2
         self._quick, self._slow = np.zeros(3), np.zeros(3)
         self._since_pose_s = math.inf
@@ -94,16 +117,39 @@ class TipObserver:
 
     def measure(self, position_m: Array, rotation: Array, waited_s: float) -> Verdict:
         """Take a pose that arrived so long before this tick."""
+        if waited_s > self._settings.timeout_s:
+            self.refused += 1
+            return Verdict.LATE
         age_s = self._settings.delay_s + waited_s + self._delay_s
         predicted, turned = self.prediction.ago(age_s)
-        residual = position_m - predicted
+        residual, pause_s = position_m - predicted, min(self._since_pose_s, 1.0)
+        tips = (position_m, predicted, predicted + self.offset_m)
+        if not self._along.believed and not self._along.look(*tips, pause_s):
+            self._since_pose_s = 0.0
+            self.refused += 1
+            return Verdict.NOT_ALONG
         verdict = self._judge(residual)
         if verdict is Verdict.REFUSED:
             self.refused += 1
             return verdict
+        if not self._along.look(*tips, pause_s):
+            self._give_back()
+            self.refused += 1
+            return Verdict.NOT_ALONG
         self._take(residual, position_m, verdict is Verdict.TAKEN and self.seen)
+        if self._along.agreed:
+            self._trusted_before = self._trusted
+        if self._along.agreed or self._along.near:
+            self._trusted = self._fast
+        if self._along.stands:
+            self._trusted_before = self._trusted
         self._follow_turn(rotation_vector(rotation @ turned.T))
         return verdict
+
+    def _give_back(self) -> None:
+        """Go back to the difference before the tip ceased to go along: what came since is wrong."""
+        self._fast = self._residual = self._trusted_before
+        self._returns = True
 
     def _judge(self, residual: Array) -> Verdict:
         """Whether a difference goes with the ones before, or has lasted long enough."""
@@ -123,7 +169,9 @@ class TipObserver:
         )
         self._candidate_s = self._candidate_s + pause_s if agrees else 0.0
         self._candidate = residual
-        if self._candidate_s < settings.jump_accept_s:
+        # A tip that is said to have gone further than may be corrected is not where it is said.
+        beyond = _norm(residual) > self.offset_max_m and not never
+        if self._candidate_s < settings.jump_accept_s or beyond:
             return Verdict.REFUSED
         self._candidate = None
         return Verdict.ACCEPTED_ANEW
@@ -142,9 +190,13 @@ class TipObserver:
         else:
             self._fast, self._quick, self._slow = residual, position_m, position_m
             self._variance_m2 = (0.1 * self._settings.model_sigma_m) ** 2
-        self._since_taken_s, self.seen = 0.0, True
+        self._since_taken_s, self.seen, self._returns = 0.0, True, False
 
     def _follow_turn(self, turn: Array) -> None:
+        """Follow a measured turn (3,); one that is larger than allowed changes nothing."""
+        self._turn_limited = _norm(turn) > self._settings.turn_max_rad
+        if self._turn_limited:
+            return
         share = min(1.0, 0.01 / self._settings.time_constant_s)
         self._turn = self._turn + share * (turn - self._turn)
         self.rotation = rotation_from_vector(self._turn)
@@ -160,9 +212,10 @@ class TipObserver:
         self._since_taken_s += self._period_s
         if self._since_taken_s > self._settings.timeout_s:
             self.seen = False
-        if not self.seen or not self._settings.enabled:
+        self._bound()
+        if not self._settings.enabled or not (self.seen or self._returns):
             return
-        difference = self._fast - self.offset_m
+        difference = self._wanted - self.offset_m
         size = _norm(difference)
         if size > self._settings.deadband_m:
             share = self._period_s / self._settings.time_constant_s
@@ -170,6 +223,14 @@ class TipObserver:
                 share *= _WHEN_STILL
             share = min(share, self._settings.rate_max_m_s * self._period_s / size)
             self.offset_m = self.offset_m + share * difference
+
+    def _bound(self) -> None:
+        """Find the correction that is wanted and allowed; there is a way back before it is told."""
+        size, most = _norm(self._fast), self.offset_max_m
+        self._wanted = self._fast if size <= most else self._fast * (most / size)
+        self._beyond_m = max(0.0, size - most)
+        again = size > (_BACK_SHARE if self.limited else 1.0) * most
+        self.limited = self.seen and (again or self._turn_limited)
 
     def estimate(self) -> tuple[Array, Array]:
         """Where the tip is now, position (3,) and rotation (3, 3).
@@ -191,7 +252,8 @@ class TipObserver:
         if math.isinf(self._since_taken_s):
             return settings.model_sigma_m
         lost = 0.0 if self.seen else min(1.0, self._since_taken_s / 30.0) * settings.model_sigma_m
-        return math.sqrt(max(self._variance_m2, _LEAST_SIGMA_M**2) + lost**2)
+        variance_m2 = max(self._variance_m2, _LEAST_SIGMA_M**2)
+        return math.sqrt(variance_m2 + lost**2 + self._beyond_m**2)
 
 
 def _norm(vector: Array) -> float:

@@ -9,7 +9,7 @@ body must be given to be there: the inverse of the lowest mode,
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,11 +25,13 @@ from pneuarm.controllers.geometry.rotations import (
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.reference.stream import STREAM_S, Stream
 from pneuarm.controllers.reference.trajectory import (
+    FASTEST_SHARE,
     Goal,
     Reference,
     ReferenceLimits,
     standing,
 )
+from pneuarm.controllers.targets.same import SAME, is_near, same
 from pneuarm.controllers.targets.targets import PoseTarget, PositionTarget, ShapeTarget, Target
 
 #: One metre of the limits allows this many radians.
@@ -37,6 +39,10 @@ _TURN_PER_M = 10.0
 
 #: Where the law is this far (m) behind, the arm cannot follow: a new target starts at the tip.
 _LOST_M = 0.02
+
+
+#: What moves slower than this (m/s) is a position that stands, and noise.
+_STANDS_M_S = 1e-3
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,7 @@ class Follower:
         self._position, self._pose = Reference(limits), Reference(limits, turn)
         self._lead, self._gain_per_s, self._jerk_max = lead, gain_per_s, limits.jerk_m_s3
         self._largest_m_s = limits.speed_m_s * 3.0**-0.5
+        self.too_fast_m_s = 0.0
         self._stream = Stream()
         self._on_the_way: deque[MovingPoint] = deque(maxlen=round(lead.ahead_s / period_s) + 1)
         self.forget()
@@ -129,16 +136,21 @@ class Follower:
             self.forget()
             return
         if isinstance(target, ShapeTarget):
-            known = self._target
-            if isinstance(known, ShapeTarget) and known == target:
+            if isinstance(self._target, ShapeTarget) and same(target, self._target):
                 return
             self._start_position(tip, velocity_m_s)
             self._go(self._position, target.at, moving=True)
             self._shape_s = 0.0
-        elif isinstance(target, PositionTarget):
-            self._set_position(target, at_s, tip, velocity_m_s)
+            self._target = target
+            return
+        velocity = self._velocity(target, at_s)
+        if self._is_repeated(target, velocity):
+            self._repeat(target)
+            return
+        if isinstance(target, PositionTarget):
+            self._set_position(target, velocity, tip, velocity_m_s)
         else:
-            self._set_pose(target, at_s, tip, velocity_m_s)
+            self._set_pose(target, velocity, tip, velocity_m_s)
         self._target = target
 
     def _go(self, reference: Reference, goal: Goal, moving: bool) -> None:
@@ -158,40 +170,43 @@ class Follower:
         (reference.stream if moving else reference.go)(at)
 
     def _velocity(self, target: PositionTarget | PoseTarget, at_s: float) -> Array:
+        """Velocity (3,) of a target: its own, or that of its stream; what the reference can do."""
         streamed = self._stream.velocity(target.position_m, at_s, self._largest_m_s)
         given = target.velocity_m_s if isinstance(target, PositionTarget) else None
-        return streamed if given is None else given
+        if given is None:
+            self.too_fast_m_s = 0.0
+            return streamed
+        fastest, most = float(np.abs(given).max()), FASTEST_SHARE * self._largest_m_s
+        self.too_fast_m_s = math.hypot(*given.tolist()) if fastest > most else 0.0
+        # Along the same direction: a goal that ran away from the reference would never be met.
+        return given * (most / fastest) if fastest > most else given
 
     def _is_repeated(self, target: PositionTarget | PoseTarget, velocity: Array) -> bool:
         """Whether the reference stands at this target, or is on its way to it, already."""
         known = self._target
-        if self._moving_goal or velocity.any():
+        if type(known) is not type(target) or isinstance(known, ShapeTarget | None):
             return False
-        if isinstance(target, PoseTarget):
-            return (
-                isinstance(known, PoseTarget)
-                and bool((known.position_m == target.position_m).all())
-                and bool((known.quaternion_xyzw == target.quaternion_xyzw).all())
-            )
-        return isinstance(known, PositionTarget) and bool(
-            (known.position_m == target.position_m).all()
+        if not is_near(known.position_m, target.position_m) or not _turned_alike(known, target):
+            return False
+        return self._stream.waits or not (
+            self._moving_goal or float(np.abs(velocity).max()) > _STANDS_M_S
         )
 
+    def _repeat(self, target: PositionTarget | PoseTarget) -> None:
+        """Take what else it says; where it is stays as it was, or noise would be a motion."""
+        known = self._target
+        if isinstance(known, PositionTarget | PoseTarget):
+            self._target = replace(target, position_m=known.position_m)
+
     def _set_position(
-        self, target: PositionTarget, at_s: float, tip: TipState, velocity_m_s: Array
+        self, target: PositionTarget, velocity: Array, tip: TipState, velocity_m_s: Array
     ) -> None:
-        velocity = self._velocity(target, at_s)
-        if self._is_repeated(target, velocity):
-            return
         self._start_position(tip, velocity_m_s)
         self._pass(self._position, target.position_m.tolist(), velocity.tolist())
 
     def _set_pose(
-        self, target: PoseTarget, at_s: float, tip: TipState, velocity_m_s: Array
+        self, target: PoseTarget, velocity: Array, tip: TipState, velocity_m_s: Array
     ) -> None:
-        velocity = self._velocity(target, at_s)
-        if self._is_repeated(target, velocity):
-            return
         turned = self._start_pose(tip, velocity_m_s)
         wanted = rotation_from_quaternion(target.quaternion_xyzw)
         turn = rotation_vector(wanted @ turned.T).tolist()
@@ -290,3 +305,12 @@ class Follower:
             turn = rotation_vector(rotation_from_quaternion(target.quaternion_xyzw) @ self._chart.T)
             end = [*target.position_m.tolist(), *turn.tolist()]
             self._go(reference, standing(end), moving=False)
+
+
+def _turned_alike(one: PositionTarget | PoseTarget, other: PositionTarget | PoseTarget) -> bool:
+    """Whether two poses have the same orientation; positions have none."""
+    if not (isinstance(one, PoseTarget) and isinstance(other, PoseTarget)):
+        return True
+    alike = abs(float(one.quaternion_xyzw @ other.quaternion_xyzw))
+    # Quaternions d apart have a product of 1 - d^2 / 2.
+    return alike >= 1.0 - 0.5 * SAME**2

@@ -15,7 +15,7 @@ from ruckig import InputParameter, Ruckig, RuckigError, Synchronization, Traject
 from pneuarm.controllers.geometry.moving_point import MovingPoint
 
 #: What a goal may ask of the limits: at the limits themselves rounding makes Ruckig refuse.
-_SHARE = 0.98
+FASTEST_SHARE = 0.98
 
 #: A moving goal is met this much later than time-optimally, so that there is a time to agree on.
 _SLACK = 1.02
@@ -55,8 +55,8 @@ class Reference:
     def __init__(self, limits: ReferenceLimits, turn: ReferenceLimits | None = None) -> None:
         axes = [limits] * 3 + ([] if turn is None else [turn] * 3)
         self.size, share = len(axes), 3.0**-0.5
-        self._speed = [_SHARE * share * axis.speed_m_s for axis in axes]
-        self._acceleration = [_SHARE * share * axis.acceleration_m_s2 for axis in axes]
+        self._speed = [FASTEST_SHARE * share * axis.speed_m_s for axis in axes]
+        self._acceleration = [FASTEST_SHARE * share * axis.acceleration_m_s2 for axis in axes]
         self._otg, self._input = Ruckig(self.size), InputParameter(self.size)
         self._speed_max = [share * axis.speed_m_s for axis in axes]
         self._input.max_velocity = self._speed_max
@@ -109,7 +109,7 @@ class Reference:
             request.target_acceleration = _clipped(aim.acceleration, self._acceleration)
             try:
                 self._otg.calculate(request, plan)
-            except RuckigError as error:
+            except (RuckigError, ValueError) as error:  # it knows results that have no name
                 self.error = " ".join(str(error).split())
                 return
             if abs(plan.duration - at_s) < _AGREED_S:

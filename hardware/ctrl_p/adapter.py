@@ -21,6 +21,8 @@ WHAT = "the Ctrl-P controller"
 READ_WAIT_PERIODS = 1.5
 #: A setpoint that has not changed, a vent, and the question for the mode are repeated (s).
 REPEAT_S = 0.2
+#: What was set at the connection is read back so often (s), for ever.
+LOOK_S = 1.0
 
 TRIPPED = (
     "its own over-pressure protection has emptied every channel: a pressure was above ceiling_bar"
@@ -91,16 +93,16 @@ class CtrlP:
         for line in (b"\n", protocol.TELEMETRY_OFF, *protocol.vent(settings.channels)):
             self._line.send(line)
         self._ask(protocol.ECHO_ON, "ECHO")
-        units = self._ask(protocol.USE_KPA, "UNITS")
+        units = self._keep(protocol.USE_KPA, "UNITS")
         if not protocol.is_in_kpa(units):
             raise self._line.error(
                 f"was asked for kPa and answers in {' and '.join(units.values) or 'no unit'}, so "
                 "that its pressures would be wrong by a factor"
             )
-        self._ask(protocol.largest_pressure(settings.ceiling_pa), "MAXP")
-        self._ask(protocol.smallest_pressure(self._smallest_pa), "MINP")
-        self._ask(protocol.ALL_CHANNELS_ON, "CHAN")
-        self._ask(protocol.telemetry_period(settings.telemetry_s), "TIME")
+        self._keep(protocol.largest_pressure(settings.ceiling_pa), "MAXP")
+        self._keep(protocol.smallest_pressure(self._smallest_pa), "MINP")
+        self._keep(protocol.ALL_CHANNELS_ON, "CHAN")
+        self._keep(protocol.telemetry_period(settings.telemetry_s), "TIME")
         self._ask(protocol.mode(Mode.VALVE), "MODE")
         self._line.send(protocol.TELEMETRY_ON)
         first = self._line.wait_for(self._measured, settings.connect_timeout_s, "with telemetry")
@@ -120,6 +122,36 @@ class CtrlP:
         self._armed = self._reported_armed = self._tripped = False
         self._fresh = True
         self._heard_s = self._sent_s = self._asked_s = -math.inf
+        self._kept: dict[str, tuple[str, ...]] = {}
+        self._strange: dict[str, int] = {}
+        self._looked_s: float | None = None
+
+    def _keep(self, command: bytes, name: str) -> Echo:
+        """Set something that safety rests on, and remember what the controller says it is now."""
+        echo = self._ask(command, name)
+        self._kept[name] = echo.values
+        return echo
+
+    def _look_at_kept(self, time_s: float) -> None:
+        """Ask once a second for all that was set at the connection; the echoes are compared."""
+        if self._looked_s is None:
+            self._looked_s = time_s
+        if time_s - self._looked_s >= LOOK_S:
+            self._looked_s = time_s
+            for name in self._kept:
+                self._line.send(protocol.ask(name))
+
+    def _check_kept(self, echo: Echo) -> None:
+        """Raise HardwareError where a setting is another one now, and has been so twice."""
+        kept = self._kept.get(echo.name)
+        same = kept is None or echo.values == kept
+        self._strange[echo.name] = 0 if same else self._strange.get(echo.name, 0) + 1
+        if kept is not None and self._strange[echo.name] > 1:
+            raise self._line.error(
+                f"has {echo.name.lower()} = {' '.join(echo.values)}, and it was set to "
+                f"{' '.join(kept)}; another program or a restart changed it, and it is set again "
+                "at the next connection"
+            )
 
     def _ask(self, command: bytes, name: str) -> Echo:
         """Send a command and return its echo; raises HardwareError where it is not known."""
@@ -141,8 +173,9 @@ class CtrlP:
     def read(self, time_s: float) -> Measurement:
         """Return the next telemetry, or the newest there is where none comes in its time.
 
-        Raises HardwareError after ``timeout_s`` without any, for setpoints that were not sent, and
-        once its own over-pressure protection has acted, until the next vent.
+        Raises HardwareError after ``timeout_s`` without any, for setpoints that were not sent, for
+        a setting that is no longer what it was set to, and once its own over-pressure protection
+        has acted, until the next vent.
         """
         self._order.check(time_s)
         self._line.take_until(self._heard, READ_WAIT_PERIODS * self._settings.telemetry_s)
@@ -152,6 +185,7 @@ class CtrlP:
         if time_s - self._heard_s > self._settings.timeout_s:
             raise self._line.error(f"has sent no telemetry for {time_s - self._heard_s:.1f} s")
         self._watch_mode(time_s)
+        self._look_at_kept(time_s)
         return Measurement(
             pressures_pa=self._values[Kind.MEASURED].copy(),
             lengths_m=self._unknown.copy(),
@@ -186,6 +220,7 @@ class CtrlP:
 
     def _take_echo(self, echo: Echo) -> bool:
         """Take an echo; one of the mode says whether the controller has let the air out itself."""
+        self._check_kept(echo)
         if echo.name != "MODE":
             return echo.name != "UNREC"
         modes = protocol.modes(echo)

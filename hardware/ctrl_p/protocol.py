@@ -86,7 +86,12 @@ def telemetry_period(period_s: float) -> bytes:
     return f"time;{period_s * 1e3:.0f}\n".encode()
 
 
-ASK_MODE = b"mode\n"
+def ask(name: str) -> bytes:
+    """Ask for the setting of a name in an echo, changing nothing."""
+    return f"{name.lower()}\n".encode()
+
+
+ASK_MODE = ask("MODE")
 ECHO_ON = b"echo;1\n"
 USE_KPA = b"units;1\n"
 ALL_CHANNELS_ON = b"chan;1\n"

@@ -27,7 +27,10 @@ class EmulatedWatchdog:
         return found
 
     def takes(self, address: int, values: list[int]) -> bool:
-        """Take its time; False where these are registers of something else."""
+        """Take its time or its fail-safe setting; False where these are other registers."""
+        if address == self._where.failsafe_register and len(values) == 1:
+            self._hold = bool(values[0])
+            return True
         if address != self._where.register or len(values) != self._where.words:
             return False
         self.timeout_ms = sum(value << (16 * index) for index, value in enumerate(values))

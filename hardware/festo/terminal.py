@@ -1,5 +1,6 @@
 """What the two Festo terminals have in common as kinds of device: keys, wiring, emulation."""
 
+import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -133,6 +134,10 @@ class FestoTerminal(EmulatedDevice[Config]):
     def left_behind(self, config: Config) -> str:
         """Nothing, as long as its watchdog is set."""
         return "" if config.watchdog_ms > 0 else KEEPS_ITS_PRESSURES
+
+    def watchdog_s(self, config: Config) -> float:
+        """Return the time that is set at every connection."""
+        return config.watchdog_ms * 1e-3 or math.inf
 
     def check_wiring(self, config: Config, arm: Arm) -> None:
         """Raise ConfigurationError where the terminal is not named, or does not fit the arm."""

@@ -9,7 +9,7 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.checked import checked_command
 from pneuarm.hardware.festo.counts import counts_of, pressures_of
-from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo.terminal_watchdog import KeptWatchdog, TerminalWatchdog
 from pneuarm.hardware.festo_cpx.protocol import CpxInputs, CpxLayout, complaint
 from pneuarm.hardware.interface import Measurement
 from pneuarm.hardware.transports.modbus import ModbusTerminal
@@ -47,6 +47,7 @@ class FestoCpx:
         self._terminal = ModbusTerminal(
             NAME, settings.host, settings.port, settings.unit_id, settings.timeout_s
         )
+        self._watchdog = KeptWatchdog(settings.watchdog, self._terminal, NAME)
         self._written: deque[list[int]] = deque(maxlen=_REMEMBERED_WRITES)
         self._mismatches = 0
 
@@ -57,16 +58,20 @@ class FestoCpx:
         self._mismatches = 0
         try:
             self._write_counts([0] * self._arm.n_chambers)
-            self._settings.watchdog.set_on(self._terminal, NAME)
+            self._watchdog.set()
             self._read_inputs()
         except HardwareError:
             self._terminal.close()
             raise
 
     def read(self, time_s: float) -> Measurement:
-        """Return what the valves say, in one block; raises HardwareError for a foreign setpoint."""
+        """Return what the valves say, in one block; raises HardwareError for a foreign setpoint.
+
+        Also where the terminal's watchdog is no longer as it was set: that is read back for ever.
+        """
         inputs = self._read_inputs()
         self._check_setpoints(inputs)
+        self._watchdog.look(time_s)
         n_sections = self._arm.n_sections
         valves = self._settings.layout.valves
         found = zip(valves, inputs.diagnosis, strict=True) if any(inputs.diagnosis) else ()

@@ -10,7 +10,7 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.checked import checked_command
 from pneuarm.hardware.festo.counts import counts_of, pressures_of
-from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
+from pneuarm.hardware.festo.terminal_watchdog import KeptWatchdog, TerminalWatchdog
 from pneuarm.hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
     IDLE,
@@ -61,13 +61,14 @@ class FestoVtem:
         self._terminal = ModbusTerminal(
             NAME, settings.host, settings.port, settings.unit_id, settings.timeout_s
         )
+        self._watchdog = KeptWatchdog(settings.watchdog, self._terminal, NAME)
 
     def connect(self) -> None:
         """Open the connection, zero every output, and start pressure regulation if it is off."""
         self._terminal.connect()
         try:
             self._write(REGULATE_COMMAND, self._zeros)
-            self._settings.watchdog.set_on(self._terminal, NAME)
+            self._watchdog.set()
             if self._inputs().slots_not_in(PRESSURE_REGULATION, REGULATING):
                 self._start()
         except HardwareError:
@@ -104,7 +105,10 @@ class FestoVtem:
         return self._inputs()
 
     def read(self, time_s: float) -> Measurement:
-        """Return what the slots say; raises HardwareError where one has stopped regulating."""
+        """Return what the slots say; raises HardwareError where one has stopped regulating.
+
+        Also where the terminal's watchdog is no longer as it was set: that is read back for ever.
+        """
         inputs = self._inputs()
         for slot in inputs.slots_not_in(PRESSURE_REGULATION, REGULATING):
             app, state = app_and_state(inputs.status[slot])
@@ -112,6 +116,7 @@ class FestoVtem:
                 f"{NAME}: slot {slot} has left pressure regulation (app {app}, state {state}); "
                 "look at the terminal for the cause"
             )
+        self._watchdog.look(time_s)
         n_sections = self._arm.n_sections
         return Measurement(
             pressures_pa=pressures_of(inputs.actual, n_sections),

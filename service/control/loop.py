@@ -20,6 +20,7 @@ from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.configuration.tables.monitors import MonitorsConfig
+from pneuarm.service.control.once import Once
 from pneuarm.service.control.record import (
     Estimate,
     GuardCounts,
@@ -123,6 +124,7 @@ class Loop:
         self._steering = Steering(
             arm, settings.control, settings.reference, settings.feedback, settings.period_s
         )
+        self._once = Once()
         self._received = Received(settings.start_ns)
         self._tool_m = np.array(arm.tool_m)
         self._zeros = np.zeros((arm.n_sections, 3))
@@ -201,6 +203,8 @@ class Loop:
             guard = self._send(command, now_s)
             self._tell(self._steering.observe(self.mode in VENTED_MODES))
             estimate = self._steering.estimate(measurement)
+            for notice in self._once.due(now_s):
+                self._modes.tell(notice)
             self._safety.worked()
             self._tick = self._whole(heading, measurement, command, guard, estimate)
         except Exception as error:  # whatever it is: an arm that nobody controls must lose its air
@@ -221,21 +225,33 @@ class Loop:
     def _take(
         self, commands: list[Command], measurement: Measurement | None, replies: list[ModeReply]
     ) -> None:
-        received = self._received
+        """Take every command, also those behind one that fails; then raise what has failed."""
+        failed: Exception | None = None
         for command in commands:
-            match command:
-                case Heartbeat():
-                    received.heartbeat_ns, received.operator = self._now_ns, command.operator
-                case SetTipPose():
-                    received.tip_pose = command
-                    self._tell(self._steering.measure(command, self._now_ns))
-                case SetTarget():
-                    # Whatever arrives before the arm is active is dropped, not kept for later.
-                    if self.mode == Mode.ACTIVE:
-                        received.target = command
-                        self._tell(self._steering.set_target(command))
-                case RequestMode():
-                    replies.append(self._answer(command, measurement))
+            try:
+                self._take_one(command, measurement, replies)
+            except Exception as error:  # a stop that comes behind it must be heard
+                failed = failed or error
+        if failed is not None:
+            raise failed
+
+    def _take_one(
+        self, command: Command, measurement: Measurement | None, replies: list[ModeReply]
+    ) -> None:
+        received = self._received
+        match command:
+            case Heartbeat():
+                received.heartbeat_ns, received.operator = self._now_ns, command.operator
+            case SetTipPose():
+                received.tip_pose = command
+                self._tell(self._steering.measure(command, self._now_ns))
+            case SetTarget():
+                # Whatever arrives before the arm is active is dropped, not kept for later.
+                if self.mode == Mode.ACTIVE:
+                    received.target = command
+                    self._tell(self._steering.set_target(command))
+            case RequestMode():
+                replies.append(self._answer(command, measurement))
 
     def _answer(self, request: RequestMode, measurement: Measurement | None) -> ModeReply:
         before, now_s, reason = self.mode, self._now_ns * 1e-9, ""
@@ -376,8 +392,11 @@ class Loop:
         )
 
     def _tell(self, notice: Notice | None) -> None:
+        """Tell what may come again in any tick: once, then how often."""
         if notice is not None:
-            self._modes.tell(notice)
+            news = self._once.take(notice, self._now_ns * 1e-9)
+            if news is not None:
+                self._modes.tell(news)
 
     def _stamped(self, emit: Callable[[pb.Event], None]) -> Callable[[pb.Event], None]:
         def stamp(event: pb.Event) -> None:

@@ -117,7 +117,11 @@ class ControlProcess:
         commands: list[Command] = []
         for pipe in (self._supervisor, self._requests, self._stream):
             for _ in range(_COMMANDS_PER_TICK):
-                message = pipe.receive()
+                try:
+                    message = pipe.receive()
+                except Exception as error:  # what cannot be read is no reason to let go of the arm
+                    self._loop.announce(_unreadable(error))
+                    continue
                 if message is None:
                     break
                 if isinstance(message, Shutdown):
@@ -147,6 +151,16 @@ class ControlProcess:
         self._loop.start_at(time.monotonic_ns())
         level = pb.INFO if granted else pb.WARNING
         self._loop.announce(Notice(level, REALTIME, f"real-time {text}, {memory}"))
+
+
+def _unreadable(error: Exception) -> Notice:
+    return Notice(
+        pb.ERROR,
+        "command_unreadable",
+        "a message from another process of the daemon cannot be read, and was left out",
+        f"{type(error).__name__}: {error}",
+        "report it with the log",
+    )
 
 
 def main(

@@ -55,7 +55,8 @@ class Steering:
         self._vented_m = PressureMap(arm).lengths_m(np.zeros((arm.n_sections, 3)))
         self.tip_m = self._tip_before_m = np.zeros(3)
         self._target: Target | None = None
-        self._camera_seen = self._refusing = self._near_reference = False
+        self._camera_seen = self._near_reference = self._limited = self._too_fast = False
+        self._verdict = Verdict.TAKEN
         self._told_error = ""
         self._told_fallbacks, self._tell_again_s = 0, 0.0
         self._dt_s = period_s
@@ -79,14 +80,29 @@ class Steering:
         if not self._follower.follows:
             controller.set_target(target)
         told, self._told_error = self._told_error, self._follower.error
-        if self._told_error in ("", told):
+        if self._told_error not in ("", told):
+            return Notice(
+                pb.WARNING,
+                "reference_error",
+                "the new target was not taken; the reference goes on to the one before",
+                self._told_error,
+                "send another target",
+            )
+        return self._too_fast_notice()
+
+    def _too_fast_notice(self) -> Notice | None:
+        """Tell when a target begins to be faster than the reference may be."""
+        before, fast_m_s = self._too_fast, self._follower.too_fast_m_s
+        self._too_fast = fast_m_s > 0.0
+        if before or not self._too_fast:
             return None
         return Notice(
             pb.WARNING,
-            "reference_error",
-            "the new target was not taken; the reference goes on to the one before",
-            self._told_error,
-            "send another target",
+            "target_too_fast",
+            f"the target moves at {1e3 * fast_m_s:.0f} mm/s, faster than the reference may along "
+            "an axis: it is followed at the reference's speed, and falls behind",
+            "velocity_m_s of the target",
+            "send slower targets, or raise reference.speed_max_mm_s",
         )
 
     def stop(self) -> None:
@@ -114,19 +130,48 @@ class Steering:
         rotation = rotation_from_quaternion(pose.quaternion_xyzw)
         waited_s = (now_ns - pose.received_ns) * 1e-9
         verdict = self._observer.measure(pose.position_m, rotation, waited_s)
-        refused_before, self._refusing = self._refusing, verdict is Verdict.REFUSED
-        if self._refusing and not refused_before:
-            return Notice(
-                pb.WARNING,
-                "tip_pose_refused",
-                "measured tip poses are refused: they jumped by more than "
-                f"{1e3 * self._feedback.jump_max_m:g} mm",
-                "a wrong or exchanged marker, or the arm was moved",
-                f"if they stay there for {self._feedback.jump_accept_s:g} s they are taken",
-            )
+        before, self._verdict = self._verdict, verdict
+        if verdict is not before and verdict in (
+            Verdict.REFUSED,
+            Verdict.NOT_ALONG,
+            Verdict.LATE,
+        ):
+            return self._disbelieved(verdict, waited_s)
         if verdict is Verdict.ACCEPTED_ANEW:
             return Notice(pb.INFO, "tip_pose_accepted", "the tip poses after the jump are taken")
         return None
+
+    def _disbelieved(self, verdict: Verdict, waited_s: float) -> Notice:
+        """Say why measured poses are not taken."""
+        feedback, most_mm = self._feedback, 1e3 * self._observer.offset_max_m
+        if verdict is Verdict.NOT_ALONG:
+            return Notice(
+                pb.WARNING,
+                "tip_pose_not_along",
+                "measured tip poses are not believed, and the correction goes back to before: the "
+                f"arm was told to move by {1e3 * feedback.still_max_m:g} mm and they did not go "
+                "along",
+                "a frozen camera or marker, exchanged axes, or something holds the arm",
+                "look at the arm and the motion-capture program; feedback.still_max_mm allows more",
+            )
+        if verdict is Verdict.LATE:
+            return Notice(
+                pb.WARNING,
+                "tip_pose_late",
+                f"measured tip poses are refused: they are {1e3 * waited_s:.0f} ms old (allowed: "
+                f"{1e3 * feedback.timeout_s:g} ms)",
+                "the gateway or the machine stalled",
+                "end what keeps the machine busy; feedback.camera_timeout_ms allows more",
+            )
+        return Notice(
+            pb.WARNING,
+            "tip_pose_refused",
+            "measured tip poses are refused: they jumped by more than "
+            f"{1e3 * feedback.jump_max_m:g} mm",
+            "a wrong or exchanged marker, or the arm was moved",
+            f"if they stay there for {feedback.jump_accept_s:g} s, no further than {most_mm:g} mm "
+            "from the model, they are taken",
+        )
 
     def step(self, dt_s: float, now_s: float) -> Array:
         """One tick of an active arm; returns the setpoints (n_sections, 3), gauge pressures."""
@@ -167,8 +212,12 @@ class Steering:
         )
 
     def observe(self, vented: bool) -> Notice | None:
-        """Let the observer see this tick's command; tell when the camera is lost or back."""
+        """Let the observer see this tick's command; tell of lost cameras and held corrections."""
         self._observer.step(self._vented_m if vented else self._controller.lengths_m)
+        if self._observer.limited != self._limited:
+            self._limited = self._observer.limited
+            if self._limited:
+                return self._limited_notice()
         if self._observer.seen == self._camera_seen:
             return None
         self._camera_seen = self._observer.seen
@@ -179,7 +228,23 @@ class Steering:
             "camera_lost",
             "no measured tip pose arrives; the correction stays as it is",
             f"none was taken for {1e3 * self._feedback.timeout_s:g} ms",
-            "look at the marker and the motion-capture program",
+            "look at the marker and the motion-capture program; one that is slower needs a longer "
+            "feedback.camera_timeout_ms",
+        )
+
+    def _limited_notice(self) -> Notice:
+        most_mm, turn_deg = (
+            1e3 * self._observer.offset_max_m,
+            math.degrees(self._feedback.turn_max_rad),
+        )
+        return Notice(
+            pb.WARNING,
+            "correction_limited",
+            f"the measured tip is more than {most_mm:g} mm or {turn_deg:g} degrees from the "
+            "model's; the correction is held there",
+            "a drifting or wrong sensor, a wrong frame, a heavy load",
+            "compare the arm with what is measured; feedback.offset_max_share and turn_max_deg "
+            "allow more",
         )
 
     def estimate(self, measurement: Measurement) -> Estimate:

@@ -49,11 +49,12 @@ class DeviceKeeper:
         return self.zero()
 
     def _is_stuck(self) -> bool:
+        now_s = time.monotonic()  # before: stopped in between, this process would blame the other
         standing = self._watch.standing()
         if standing is None or standing.state == LinkState.SILENT:
             return False
         connecting = standing.state in (LinkState.STARTING, LinkState.LOST)
-        age_s = time.monotonic() - standing.published_s
+        age_s = now_s - standing.published_s
         return age_s > (_STUCK_CONNECTING_S if connecting else _STUCK_S)
 
     def zero(self) -> str:

@@ -1,7 +1,8 @@
 """The device process: the guard and a blocking transport, away from the loop.
 
 It moves the arm only while control's commands are fresh. When they are not it sends zeros and then
-nothing at all, so that the device's own watchdog runs out if this was not enough.
+nothing at all, so that the device's own watchdog runs out if this was not enough. After a gap in
+its own exchanges it does not go on either: meanwhile the device may have vented by itself.
 """
 
 import socket
@@ -15,6 +16,7 @@ from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.processes import realtime
 from pneuarm.service.processes.device_slots import (
+    SILENT_S,
     DeviceCommand,
     DeviceEnd,
     DeviceLink,
@@ -38,13 +40,18 @@ class DeviceProcess:
     def __init__(self, configuration: Configuration, link: DeviceLink, end: Connection) -> None:
         arm = configuration.build_arm()
         period_s = 1.0 / configuration.control.rate_hz
-        guard = Guard(arm, period_s, configuration.hardware.supply_flow_limit_pa_s)
-        self._device = GuardedDevice(backends.build(configuration, arm), guard, arm.n_sections)
-        self._link = DeviceEnd(link)
-        self._max_age_s = max(Guard.MAX_AGE_PERIODS * period_s, Guard.MAX_AGE_S)
         self._period_s = 1.0 / min(
             configuration.hardware.exchange_rate_hz, configuration.control.rate_hz
         )
+        flow_pa_s = configuration.hardware.supply_flow_limit_pa_s
+        guard = Guard(arm, period_s, flow_pa_s, self._period_s)
+        self._device = GuardedDevice(backends.build(configuration, arm), guard, arm.n_sections)
+        self._look_first_s = guard.max_elapsed_s
+        watchdog_s = configuration.device.watchdog_s(configuration.of_device(configuration.device))
+        self._gap_max_s = 0.5 * min(watchdog_s, SILENT_S)
+        self._exchanged_s = 0.0
+        self._link = DeviceEnd(link)
+        self._max_age_s = max(Guard.MAX_AGE_PERIODS * period_s, Guard.MAX_AGE_S)
         self._end = end
         self._connected = self._may_regulate = self._silent = False
         self._retry_s = 0.0
@@ -104,7 +111,7 @@ class DeviceProcess:
         try:
             self._device.close()
             self._device.connect()
-            self._device.vent(time.monotonic())
+            self._vent()
             self._measure()
         except HardwareError as error:
             self._lose(error)
@@ -112,27 +119,55 @@ class DeviceProcess:
         self._connected = True
 
     def _exchange(self, command: DeviceCommand | None) -> None:
+        """Write and read; after a longer pause read first: the device may not be as it was."""
         try:
+            if time.monotonic() - self._exchanged_s > self._look_first_s:
+                self._measure()
             self._write(command)
             self._measure()
         except HardwareError as error:
             self._lose(error)
 
+    def _note_gap(self) -> None:
+        """Raise HardwareError where the device was not talked to for half of its watchdog's time.
+
+        Called before and after each call: this process may be stopped in the middle of one. While
+        nothing but zeros has been sent there is nothing that could come back.
+        """
+        now_s = time.monotonic()
+        gap_s, self._exchanged_s = now_s - self._exchanged_s, now_s
+        if gap_s > self._gap_max_s and self._device.sent_pa.any():
+            raise HardwareError(
+                f"the device was not talked to for {1e3 * gap_s:.0f} ms (allowed: "
+                f"{1e3 * self._gap_max_s:.0f} ms): its process stood still, or the device answers "
+                "too slowly, and it may have vented by itself; end what keeps the machine busy, "
+                "then reset"
+            )
+
+    def _vent(self) -> None:
+        """Send zeros."""
+        self._device.vent(time.monotonic())
+        self._exchanged_s = time.monotonic()
+
     def _write(self, command: DeviceCommand | None) -> None:
         warm = command is not None and command.sequence > WARM_UP_COMMANDS
         self._may_regulate |= warm and command is not None and command.order == Order.VENT
-        now_s = time.monotonic()
         regulates = self._may_regulate and self._parent_gone_s is None
         if command is None or not warm or not regulates or command.order == Order.VENT:
-            self._device.vent(now_s)
+            self._vent()
         else:
+            self._note_gap()
+            now_s = time.monotonic()
             guarded = self._device.write(command.pressures_pa, command.commanded_at_s, now_s)
+            self._note_gap()
             self._device.acknowledged(time.monotonic())
             self._link.intervened(guarded.intervention)
         self._link.sent(self._device.sent_pa)
 
     def _measure(self) -> None:
+        self._note_gap()
         measurement = self._device.read(time.monotonic())
+        self._note_gap()
         now_s = time.monotonic()
         self._link.measured(measurement, now_s, now_s)
 

@@ -9,13 +9,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
 import zenoh
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
 from pneuarm.controllers.limits.limits import words, workspace_is_exact
+from pneuarm.controllers.targets.same import is_near
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 from pneuarm.controllers.workspace.reachability import Reachability
 from pneuarm.controllers.workspace.workspace import Workspace
@@ -58,7 +58,9 @@ class Inbox:
         arm, frames = configuration.build_arm(), configuration.frames.frames()
         self._checker = TargetChecker(arm, frames, configuration.reference.limits())
         feedback = configuration.feedback
-        self._source = TipPoseSource(feedback.tip_pose_source, read_key(feedback))
+        self._source = TipPoseSource(
+            feedback.tip_pose_source, read_key(feedback), 1e-3 * feedback.camera_timeout_ms
+        )
         self._told_open = False
         self._holders = Allowance(_HOLDERS_SHARE)
         self._poses = Allowance(_POSES_SHARE)
@@ -138,7 +140,7 @@ class Inbox:
         if bool(self._workspace.contains(target.position_m)):
             self._out_of_reach = False
             return target
-        if self._nearest is None or not np.array_equal(self._nearest[0], target.position_m):
+        if self._nearest is None or not is_near(self._nearest[0], target.position_m):
             if self._out_of_reach and now_ns - self._searched_ns < _SEARCH_EVERY_NS:
                 return target
             self._nearest = target.position_m, self._workspace.is_reachable(target.position_m)

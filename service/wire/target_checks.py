@@ -15,6 +15,7 @@ from pneuarm.controllers.geometry.rotations import (
 )
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
 from pneuarm.controllers.targets import checks
+from pneuarm.controllers.targets.same import same
 from pneuarm.controllers.targets.targets import KINDS, LawName, ShapeTarget, Target
 from pneuarm.controllers.workspace.workspace import Workspace
 from pneuarm.logs.schema import pneuarm_pb2 as pb
@@ -42,7 +43,7 @@ class TargetChecker:
         if name is None:
             raise TargetRejected(f"the message holds no target; one of {', '.join(KINDS)}")
         target = KINDS[name].checked(plain(getattr(message, name)), self._allowed, law)
-        if isinstance(target, ShapeTarget) and target != self._passed:
+        if isinstance(target, ShapeTarget) and not same(target, self._passed):
             self._check_reach(target)  # once: the same shape comes again and again
             target.check_speed(self._allowed)
             self._passed = target

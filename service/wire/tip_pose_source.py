@@ -21,6 +21,9 @@ from pneuarm.service.configuration.tables.feedback import FeedbackConfig
 #: A publisher not heard for this long (s) may be replaced by another, where none is configured.
 SILENT_S = 1.0
 
+#: How fast (s/s) two clocks may run apart without a pose looking late.
+_CLOCKS_DRIFT = 1e-3
+
 _SHORTEST_KEY_BYTES = 16
 
 #: What a google.protobuf.Timestamp may hold: the years 1 to 9999.
@@ -57,8 +60,10 @@ def source_of(key: str) -> str:
 class TipPoseSource:
     """Tells the one publisher that is believed from others, and old poses from new ones."""
 
-    def __init__(self, name: str = "", key: bytes = b"") -> None:
-        self.name = name
+    def __init__(self, name: str = "", key: bytes = b"", late_s: float = inf) -> None:
+        """Believe the publisher ``name`` and ``key``; poses later than ``late_s`` are refused."""
+        self.name, self._late_s = name, late_s
+        self._least_delay_s = inf
         self._key = key
         self._newest = ""
         self._heard_s = -inf
@@ -106,8 +111,25 @@ class TipPoseSource:
                 "the tip pose is not newer than the one before: its time stamp is "
                 f"{(last_ns - stamp_ns) * 1e-9:.3g} s behind; is there a second publisher?"
             )
+        if stamp_ns is not None:
+            self._check_late(now_s - stamp_ns * 1e-9, now_s)
         self._newest, self._heard_s = source, now_s
         self._stamp_ns = last_ns if stamp_ns is None else stamp_ns
+
+    def _check_late(self, delay_s: float, now_s: float) -> None:
+        """Raise MessageRejected for a pose that took longer than the quickest one of late.
+
+        Two clocks have no common zero, so only the difference says something.
+        """
+        since_s = now_s - self._heard_s
+        least_s = inf if since_s > SILENT_S else self._least_delay_s + _CLOCKS_DRIFT * since_s
+        if delay_s - least_s > self._late_s:
+            raise MessageRejected(
+                f"the tip pose is {delay_s - least_s:.3g} s later than others of its publisher "
+                f"(allowed: {self._late_s:g} s, feedback.camera_timeout_ms): its network or this "
+                "machine has stalled"
+            )
+        self._least_delay_s = min(least_s, delay_s)
 
 
 def _called(source: str) -> str:

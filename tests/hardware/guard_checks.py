@@ -33,9 +33,18 @@ def filled(values: object) -> Array:
     return np.array(values, dtype=float).reshape(1, 3)
 
 
-def ready(Guard: Any, sent: object = (0.0, 0.0, 0.0), flow_pa_s: float = inf) -> Any:
+#: So long a period that no slew binds: where something else is looked at.
+UNHURRIED_S = 10.0
+
+
+def ready(
+    Guard: Any,
+    sent: object = (0.0, 0.0, 0.0),
+    flow_pa_s: float = inf,
+    exchange_s: float = 0.0,
+) -> Any:
     """Guard that has seen a write acknowledged at time 0."""
-    guard = Guard(paper_arm(), PERIOD_S, flow_pa_s)
+    guard = Guard(paper_arm(), PERIOD_S, flow_pa_s, exchange_s)
     guard.acknowledge(filled(sent), 0.0)
     return guard
 
@@ -52,13 +61,15 @@ def expect(guarded: Any, pressures_pa: object, bits: int) -> None:
 @check
 def what_is_allowed_passes_unchanged(Guard: Any) -> None:
     for values in ([0.0, 0.0, 0.0], [LOW, HIGH, 1.0], [1e4, -2e4, 3e4], [-1.0, -1e-9, 1e-300]):
-        expect(ready(Guard).check(filled(values), 10.0, 10.0), values, NOTHING)
+        guard = ready(Guard, exchange_s=UNHURRIED_S)
+        expect(guard.check(filled(values), 10.0, 10.0), values, NOTHING)
 
 
 @check
 def a_pressure_beyond_its_range_is_brought_back_alone(Guard: Any) -> None:
     for wanted, bound in ((HIGH + 1e-3, HIGH), (HIGH + 1.0, HIGH), (LOW - 1e-3, LOW), (-9e9, LOW)):
-        guarded = ready(Guard).check(filled([100.0, wanted, -100.0]), 10.0, 10.0)
+        guard = ready(Guard, exchange_s=UNHURRIED_S)
+        guarded = guard.check(filled([100.0, wanted, -100.0]), 10.0, 10.0)
         expect(guarded, [100.0, bound, -100.0], RANGE)
 
 
@@ -73,7 +84,7 @@ def what_a_device_sent_beyond_the_range_does_not_widen_it(Guard: Any) -> None:
 @check
 def every_section_has_its_own_limits(Guard: Any) -> None:
     arm = Arm("mixed", (*paper_arm().sections, *table1_arm().sections))
-    guard = Guard(arm, PERIOD_S)
+    guard = Guard(arm, PERIOD_S, exchange_period_s=UNHURRIED_S)
     guard.acknowledge(np.zeros((2, 3)), 0.0)
     slewed = guard.check(np.full((2, 3), 1e6), 0.01, 0.01).pressures_pa
     np.testing.assert_allclose(slewed, [[2e3] * 3, [4e3] * 3])
@@ -104,6 +115,20 @@ def the_slew_counts_from_the_last_write_that_was_acknowledged(Guard: Any) -> Non
     guard.acknowledge(filled(3 * [5e3]), 0.020)
     guarded = guard.check(filled(3 * [HIGH]), 0.03, 0.03)
     np.testing.assert_allclose(guarded.pressures_pa, 5e3 + SLEW * 0.01)
+
+
+@check
+def a_gap_saves_up_no_more_than_four_periods(Guard: Any) -> None:
+    for more, period_s in (((), PERIOD_S), ((inf, 0.001), PERIOD_S), ((inf, 0.02), 0.02)):
+        for gap_s in (4.1 * period_s, 0.3, 1e6):
+            guard = Guard(paper_arm(), PERIOD_S, *more)
+            guard.acknowledge(np.zeros((1, 3)), 0.0)
+            guarded = guard.check(filled([HIGH, -SLEW * 3.9 * period_s, 0.0]), gap_s, gap_s)
+            expected = [min(HIGH, 4.0 * SLEW * period_s), -SLEW * 3.9 * period_s, 0.0]
+            np.testing.assert_allclose(guarded.pressures_pa, [expected])
+    guard = ready(Guard, flow_pa_s=1e5)
+    guarded = guard.check(filled([1e4, 0.0, 0.0]), 60.0, 60.0)
+    np.testing.assert_allclose(guarded.pressures_pa, [[1e5 * 4.0 * PERIOD_S, 0.0, 0.0]])
 
 
 @check
@@ -156,7 +181,7 @@ def a_command_is_void_after_three_periods_or_50_ms_whichever_is_longer(Guard: An
     command = filled([2e4, 1e4, -1e4])
     for period_s, limit_s in ((0.001, 0.05), (0.005, 0.05), (0.02, 0.06), (0.1, 0.3)):
         guard = Guard(paper_arm(), period_s)
-        guard.acknowledge(filled(3 * [2e4]), 0.0)
+        guard.acknowledge(command, 0.0)
         expect(guard.check(command, 10.0, 10.0 + limit_s - 1e-9), command, NOTHING)
         expect(guard.check(command, 10.0, 10.0 + limit_s + 1e-9), [0.0] * 3, TOO_OLD)
     for commanded_at_s, now_s in ((0.0, 0.05), (10.0, 10.0)):  # the ends themselves are allowed

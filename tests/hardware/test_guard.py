@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 
 from pneuarm.hardware import guard as guard_module
 from pneuarm.hardware.guard import Guard, Intervention
-from tests.hardware.guard_checks import CHECKS, HIGH, LOW, Check, filled, ready, safe_over
+from tests.hardware.guard_checks import (
+    CHECKS,
+    HIGH,
+    LOW,
+    UNHURRIED_S,
+    Check,
+    filled,
+    ready,
+    safe_over,
+)
 
 #: What may come from upstream, broken or not.
 PRESSURES = st.one_of(
@@ -39,7 +48,7 @@ def test_whatever_comes_stays_finite_in_range_within_slew_and_supply(commands: l
 
 @given(st.lists(st.floats(LOW, HIGH), min_size=3, max_size=3))
 def test_a_command_that_is_allowed_passes_unchanged(values: list[float]) -> None:
-    guarded = ready(Guard).check(filled(values), 10.0, 10.0)
+    guarded = ready(Guard, exchange_s=UNHURRIED_S).check(filled(values), 10.0, 10.0)
     np.testing.assert_array_equal(guarded.pressures_pa, filled(values))
     assert guarded.intervention == Intervention.NOTHING
 

@@ -30,14 +30,14 @@ def device_of(flow_pa_s: float = np.inf) -> tuple[GuardedDevice, Taken]:
 
 def test_a_command_that_waited_too_long_becomes_zeros_at_the_device() -> None:
     guarded, device = device_of()
-    wanted = np.full((1, 3), 1e4)
+    wanted = np.full((1, 3), 500.0)
     fresh = guarded.write(wanted, 1.0, 1.04)
     assert fresh.intervention == Intervention.NOTHING
     np.testing.assert_array_equal(device.newest, wanted)
     old = guarded.write(wanted, 1.0, 1.06)
     assert old.intervention == Intervention.TOO_OLD
     np.testing.assert_array_equal(device.newest, 0.0)
-    again = guarded.write(wanted, 1.07, 1.07)  # and from there the slew counts anew
+    again = guarded.write(wanted, 1.061, 1.061)  # and from there the slew counts anew
     assert again.intervention == Intervention.SLEW
     assert (device.newest > 0.0).all()
     assert (device.newest < wanted).all()
@@ -45,6 +45,6 @@ def test_a_command_that_waited_too_long_becomes_zeros_at_the_device() -> None:
 
 def test_a_limited_supply_reaches_the_device() -> None:
     guarded, device = device_of(flow_pa_s=1e4)
-    sent = guarded.write(np.array([[1e4, 0.0, 0.0]]), 0.1, 0.1)
+    sent = guarded.write(np.array([[500.0, 0.0, 0.0]]), 0.003, 0.003)
     assert sent.intervention == Intervention.SUPPLY
-    np.testing.assert_allclose(device.newest, [[1e3, 0.0, 0.0]])
+    np.testing.assert_allclose(device.newest, [[30.0, 0.0, 0.0]])

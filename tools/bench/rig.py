@@ -1,6 +1,7 @@
 """A simulated arm with a simulated camera in the real loop, on simulated time."""
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -83,6 +84,8 @@ class CameraRig:
         self._target: Target | None = None
         self._sequence = 0
         self.outlier_m = np.zeros(3)
+        #: What the camera makes of a position (3,) and a quaternion (4,) at a time (s).
+        self.lie: Callable[[Array, Array, float], tuple[Array, Array]] | None = None
 
     def _look(self) -> None:
         """Take a picture when it is time; called after the device was read."""
@@ -93,6 +96,8 @@ class CameraRig:
         if self.camera:
             noisy = position + self._rng.normal(0.0, self._noise_m, 3) + self.outlier_m
             quaternion = quaternion_from_rotation(rotation)
+            if self.lie is not None:
+                noisy, quaternion = self.lie(noisy, quaternion, self.now_ns * 1e-9)
             self._on_the_way.append((self.now_ns + self._delay_ns, noisy, quaternion))
 
     def _arrived(self) -> list[Command]:

@@ -6,7 +6,14 @@ import sys
 import time
 from pathlib import Path
 
-from tools.faults import client_faults, device_faults, machine_faults, process_faults, wire_faults
+from tools.faults import (
+    client_faults,
+    device_faults,
+    machine_faults,
+    process_faults,
+    sensor_faults,
+    wire_faults,
+)
 from tools.faults.campaign import run_campaign, tell
 from tools.faults.fault import Fault
 from tools.faults.report import Report, write_again, write_page
@@ -18,6 +25,7 @@ FAULTS: tuple[Fault, ...] = (
     *wire_faults.FAULTS,
     *machine_faults.FAULTS,
     *device_faults.FAULTS,
+    *sensor_faults.FAULTS,
 )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from pneuarm.hardware.transports.modbus import ModbusTerminal
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from tools.faults.fault import Fault
 from tools.faults.injection import Injection
@@ -21,6 +22,10 @@ _SETTLED_S = 1.2
 #: A serial device that is there again is connected within so long.
 _AGAIN_S = 2.0
 
+#: What safety rests on in a terminal is read back within so long, and these are its registers.
+_READ_BACK_S = 1.4
+_WATCHDOG, _FAILSAFE = 46100, 46101
+
 Words = Callable[[Injection], str]
 
 
@@ -36,6 +41,28 @@ def _transport(words: Words) -> Callable[[Rig, Injection], None]:
         rig.wait_for_mode(pb.FAULT)
         rig.wait_until_empty()
         rig.emulator.inject("clear")
+
+    return inject
+
+
+def _foreign(register: int, value: int) -> Callable[[Rig, Injection], None]:
+    """Another master writes a register that safety rests on: fault, and it is set again."""
+
+    def inject(rig: Rig, injection: Injection) -> None:
+        assert rig.emulator is not None
+        port = int(rig.emulator.tables["festo_cpx"]["port"])
+        other = ModbusTerminal("another master", "127.0.0.1", port, 1, 0.5)
+        other.connect()
+        injection.must_reach(pb.FAULT, within_s=_READ_BACK_S)
+        injection.zero_within_s = _READ_BACK_S
+        injection.begin()
+        other.write(register, [value])
+        rig.wait_for_mode(pb.FAULT)
+        rig.wait_until_empty()
+        if register == _WATCHDOG:
+            rig.wait_until(lambda: other.read(register, 1) != [value], "the watchdog set again")
+        other.write(_FAILSAFE, [0])
+        other.close()
 
     return inject
 
@@ -172,6 +199,14 @@ FAULTS = (
     _tcp("Modbus exceptions", lambda i: f"exception {i.random.randint(1, 3)}"),
     _tcp("answer to another question", lambda injection: "wrong"),
     _tcp("garbage for an answer", lambda injection: "garbage"),
+    Fault("terminal: watchdog off, another master", _LATCHED, _foreign(_WATCHDOG, 0), device=_CPX),
+    Fault("terminal: watchdog 60 s", _LATCHED, _foreign(_WATCHDOG, 60_000), device=_CPX),
+    Fault(
+        "terminal: fail-safe 'hold last state'",
+        _LATCHED,
+        _foreign(_FAILSAFE, 1),
+        device=_CPX,
+    ),
     _air("sensor not a number", _chamber("sensor-nan")),
     _air("sensor frozen", _chamber("sensor-frozen")),
     _air("sensor offset, 0.4 to 0.8 bar", _offset),

@@ -36,8 +36,10 @@ _SECTIONS: dict[str, dict[str, float]] = {
 }
 
 
-def _own_arm(what: str) -> dict[str, Any]:
-    """Tables of an arm that the device can move, empty for the default one."""
+def _own_tables(what: str) -> dict[str, Any]:
+    """Tables of an arm that the device can move, and what the device shows of itself."""
+    if what.startswith("festo"):
+        return {what.replace("-", "_"): {"failsafe_register": 46101}}
     if what not in _SECTIONS:
         return {}
     preset = files("pneuarm.service.configuration").joinpath("presets", "paper.toml")
@@ -49,7 +51,7 @@ class Emulator:
     """`pneuarm emulate WHAT`, with the tables that make a daemon use it."""
 
     def __init__(self, what: str, folder: Path) -> None:
-        own = _own_arm(what)
+        own = _own_tables(what)
         arm = folder / f"{what}.toml"
         arm.write_text(tomli_w.dumps(own))
         self.jitter_s = 0.0 if what.startswith("festo") else _SERIAL_JITTER_S
@@ -57,7 +59,9 @@ class Emulator:
         self._program = Program(
             "pneuarm", "emulate", what, "--arm", str(arm), "--record", str(self.record)
         )
-        self.tables = own | self._configuration()
+        self.tables = dict(own)
+        for name, table in self._configuration().items():
+            self.tables[name] = own.get(name, {}) | table
         self._go_first()
 
     def _configuration(self) -> dict[str, dict[str, Any]]:

@@ -1,8 +1,12 @@
 """Processes of the daemon die or stand still."""
 
+import contextlib
 import os
 import signal
+import time
 from collections.abc import Callable
+
+import pytest
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.modes.mode_keeper import GATEWAY_LOST_S, GATEWAY_SILENT_S
@@ -119,7 +123,55 @@ def _outsider(name: str, number: int) -> Callable[[Rig, Injection], None]:
     return inject
 
 
+#: So long does a process sleep: around every timeout that somebody has for it, and in between.
+_STALLS_S = {
+    "device": (0.02, 0.6),
+    "control": (0.01, 0.25),
+    "gateway": (0.1, 2.5),
+    "recorder": (0.1, 3.0),
+    "viewer": (0.1, 3.0),
+    "supervisor": (0.05, 1.5),
+}
+
+
+def _stalled(name: str) -> Callable[[Rig, Injection], None]:
+    """A process sleeps and goes on: nothing may come back in a step, at the device or elsewhere."""
+
+    def inject(rig: Rig, injection: Injection) -> None:
+        process = rig.daemon.process
+        assert process is not None
+        pid = process.pid if name == "supervisor" else rig.pid(name)
+        stall_s = injection.random.uniform(*_STALLS_S[name])
+        injection.begin()
+        os.kill(pid, signal.SIGSTOP)
+        time.sleep(stall_s)
+        with contextlib.suppress(ProcessLookupError):  # killed meanwhile
+            os.kill(pid, signal.SIGCONT)
+        time.sleep(0.5)
+        if name == "control" and (stall_s > _CONTROL_LOST_S or not rig.alive):
+            with contextlib.suppress(pytest.fail.Exception):
+                rig.wait_until(lambda: not rig.alive or None, "the end", 3.0)
+            if not rig.alive:
+                rig.wait_for_end(injection, 3)
+                return
+        rig.wait_until(lambda: rig.mode is not None, "an answer")
+        if name in ("recorder", "viewer", "supervisor"):
+            injection.must_go_on()
+        else:
+            injection.must_stay(*_STALLED_MODES)
+
+    return inject
+
+
+_CONTROL_LOST_S = 0.09
+_STALLED_MODES = (pb.ACTIVE, pb.HOLD, pb.FAULT, pb.IDLE, pb.READY)
+
 _CPX = "festo-cpx"
+_STALLS = {
+    "device": "goes on, or fault and zeros, latched",
+    "control": "goes on, or fault and zeros, or zeroed by the supervisor",
+    "gateway": "goes on, holds, or vents after 2 s",
+}
 _ENDS = "zeroed by the supervisor, which ends the daemon with status 3"
 _GOES_ON = "goes on, and nothing is missing in the log"
 
@@ -148,4 +200,14 @@ FAULTS = (
     Fault("recorder stopped", _GOES_ON, _outsider("recorder", signal.SIGSTOP)),
     Fault("viewer killed", _GOES_ON, _outsider("viewer", signal.SIGKILL), _VIEWED),
     Fault("viewer stopped", _GOES_ON, _outsider("viewer", signal.SIGSTOP), _VIEWED),
+    *(
+        Fault(
+            f"{name} stalls, {1e3 * least_s:.0f} to {1e3 * most_s:.0f} ms",
+            _STALLS.get(name, _GOES_ON),
+            _stalled(name),
+            _VIEWED if name == "viewer" else {},
+            _CPX,
+        )
+        for name, (least_s, most_s) in _STALLS_S.items()
+    ),
 )

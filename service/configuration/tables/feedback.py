@@ -1,5 +1,6 @@
 """The reference between targets, and the correction by the measured tip."""
 
+import math
 from typing import Annotated
 
 from pydantic import Field
@@ -77,6 +78,31 @@ class FeedbackConfig(Table):
         float,
         Field(gt=0, le=60, description="poses that stay there, and agree, for this long are taken"),
     ] = 0.5
+    offset_max_share: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=1,
+            description="largest correction of the position, as a share of the arm's length; what "
+            "is measured beyond is held there and told (`correction_limited`)",
+        ),
+    ] = 0.25
+    turn_max_deg: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=180,
+            description="largest correction of the orientation; a pose that is turned further "
+            "changes it no more",
+        ),
+    ] = 45.0
+    still_max_mm: Annotated[
+        Positive,
+        Field(
+            description="where the model's tip moves this far and the measured one does not go "
+            "along, no pose is believed until it does (`tip_pose_not_along`)"
+        ),
+    ] = 10.0
     model_sigma_mm: Annotated[
         Positive,
         Field(description="standard deviation of the tip where nothing but pressures is measured"),
@@ -158,6 +184,9 @@ class FeedbackConfig(Table):
             deadband_m=self.deadband_mm * MM,
             jump_max_m=self.jump_max_mm * MM,
             jump_accept_s=self.jump_accept_s,
+            offset_max_share=self.offset_max_share,
+            turn_max_rad=math.radians(self.turn_max_deg),
+            still_max_m=self.still_max_mm * MM,
             model_sigma_m=self.model_sigma_mm * MM,
             length_sigma_m=self.length_sigma_mm * MM,
             dither_pa=self.dither_mbar * _MBAR,

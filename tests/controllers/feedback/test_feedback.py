@@ -70,7 +70,7 @@ def test_a_jump_is_refused_and_taken_when_it_lasts() -> None:
     setup = Setup()
     setup.run(4.0, OFFSET_M)
     kept = setup.observer.offset_m.copy()
-    away = OFFSET_M + np.array([0.05, 0.0, 0.0])
+    away = OFFSET_M + np.array([0.03, 0.0, 0.0])
     assert set(setup.run(0.05, away)) == {Verdict.REFUSED}
     assert setup.observer.offset_m == pytest.approx(kept, abs=SETTINGS.deadband_m)
     assert set(setup.run(0.3, OFFSET_M)) == {Verdict.TAKEN}
@@ -116,3 +116,11 @@ def test_the_estimate_says_what_it_rests_on() -> None:
     assert seen.source == EstimateSource.TIP_POSE
     assert seen.position_m == pytest.approx(setup.position + OFFSET_M, abs=1e-4)
     assert seen.sigma_m < 1e-3
+
+
+def test_a_first_correction_larger_than_the_way_that_is_judged_is_believed() -> None:
+    """The arm stands, and only the correction moves: no reason to doubt the camera."""
+    setup = Setup()
+    large = np.array([0.03, 0.0, 0.0])
+    assert set(setup.run(6.0, large)) == {Verdict.TAKEN}
+    assert setup.observer.offset_m == pytest.approx(large, abs=SETTINGS.deadband_m)

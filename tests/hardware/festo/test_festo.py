@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -136,6 +137,46 @@ def test_a_terminal_that_would_trap_the_air_is_refused_where_it_shows_it() -> No
         ours.connect()
     with cpx(shown) as (ours, _, _):
         ours.connect()
+
+
+FAILSAFE_SHOWN = TerminalWatchdog(46100, 1, 400, failsafe_register=46101)
+
+
+@pytest.mark.parametrize("kind", ["cpx", "vtem"])
+@pytest.mark.parametrize(("register", "value"), [(46100, 0), (46100, 60000), (46101, 1)], ids=str)
+def test_what_another_program_does_to_the_watchdog_is_seen_within_a_second(
+    kind: str, register: int, value: int
+) -> None:
+    arm = EmulatedArm(PAPER, 0)
+    layout = VtemLayout((0, 1, 2))
+    terminal = (
+        EmulatedCpx(arm, LAYOUT, FAILSAFE_SHOWN)
+        if kind == "cpx"
+        else EmulatedVtem(arm, layout, FAILSAFE_SHOWN)
+    )
+    with ServedTerminal(terminal) as served:
+        settings = cpx_settings(served.port, LAYOUT, FAILSAFE_SHOWN)
+        vtem = replace(vtem_settings(served.port, layout), watchdog=FAILSAFE_SHOWN)
+        quick = lambda seconds: time.sleep(0.2 * seconds)  # noqa: E731
+        ours = FestoCpx(PAPER, settings) if kind == "cpx" else FestoVtem(PAPER, vtem, quick)
+        ours.connect()
+        for tick in range(250):
+            ours.read(0.01 * tick)
+        other = ModbusTerminal("other", "127.0.0.1", served.port, 1, 0.5)
+        other.connect()
+        other.write(register, [value])
+
+        def read_for_a_second() -> None:
+            for tick in range(250, 360):
+                ours.read(0.01 * tick)
+
+        with pytest.raises(HardwareError, match=rf"\b{value}\b.*{register}"):
+            read_for_a_second()
+        other.close()
+        if register == 46100:  # a new connection sets it again
+            ours.connect()
+            assert terminal.read(46100, 1) == [400]
+        ours.close()
 
 
 def test_a_watchdog_of_two_words_is_set_and_runs_out() -> None:

@@ -219,6 +219,16 @@ def test_setpoints_that_nobody_sent_are_told(device) -> None:
         assert not emulator.arm.setpoints_pa.any()
 
 
+@pytest.mark.parametrize("line", [b"maxp;900\n", b"minp;-300\n", b"time;2000\n", b"units;0\n"])
+def test_what_was_set_once_on_a_ctrl_p_is_read_back_for_ever(line: bytes) -> None:
+    with ctrl_p(timeout_s=5.0) as (adapter, emulator, terminal):
+        adapter.connect()
+        read_for(adapter, 1.2)
+        with terminal.lock:
+            emulator.take(line, time.monotonic())
+        assert line.split(b";")[0].decode() in error_within(adapter, 5.0)
+
+
 def test_an_esp32_that_has_begun_to_fill_the_chambers_is_emptied() -> None:
     """After power came it controls lengths, without being asked."""
     with esp32() as (adapter, emulator, _):

@@ -5,6 +5,7 @@ import re
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -18,12 +19,20 @@ from pneuarm.hardware.guard import Guard
 from pneuarm.hardware.transports.modbus_server import ServedTerminal
 from pneuarm.service.configuration.configuration import Configuration, check, load
 from pneuarm.service.devices.process import WARM_UP_COMMANDS, DeviceProcess
-from pneuarm.service.processes.device_slots import DeviceLink, DeviceWatch, LinkedDevice, LinkState
+from pneuarm.service.processes.device_slots import (
+    SILENT_S,
+    DeviceLink,
+    DeviceWatch,
+    LinkedDevice,
+    LinkState,
+)
 from tests.hardware.festo.festo_bench import WATCHDOG
 
 SOME_PA = np.array([[2e4, -1e4, 1e4]])
 ZEROS = np.zeros((1, 3))
 MAX_AGE_S = 0.3
+#: Likewise: half of the terminal's watchdog would be too short for a test machine.
+GAP_MAX_S = 0.25
 
 
 def configuration_for(port: int) -> Configuration:
@@ -40,6 +49,19 @@ class Terminal(EmulatedCpx):
     def __init__(self, arm: EmulatedArm) -> None:
         super().__init__(arm, CpxLayout((0, 1, 2)), WATCHDOG)
         self.asked = 0
+        self.calls: list[str] = []
+        self.written: list[list[int]] = []
+
+    def read(self, address: int, count: int) -> list[int] | None:
+        if address != WATCHDOG.register:  # which is looked at once a second
+            self.calls.append("read")
+        return super().read(address, count)
+
+    def write(self, address: int, values: list[int], now_s: float) -> bool:
+        if address != WATCHDOG.register:
+            self.calls.append("write")
+            self.written.append(values)
+        return super().write(address, values, now_s)
 
     def touched(self, now_s: float) -> None:
         self.asked += 1
@@ -55,6 +77,7 @@ class Rig:
         self.control = LinkedDevice(self.link)
         self.ends = multiprocessing.Pipe()
         self.process = DeviceProcess(configuration_for(served.port), self.link, self.ends[0])
+        self.process._gap_max_s = GAP_MAX_S
 
     def write(self, pressures_pa: Array) -> None:
         now_s = time.monotonic()
@@ -150,6 +173,64 @@ def test_a_loop_that_stands_still_gets_zeros_then_silence_and_is_not_covered(rig
     with pytest.raises(HardwareError, match="connected again"):
         rig.control.read(time.monotonic())
     rig.active()
+
+
+def test_half_of_the_watchdog_is_what_a_gap_may_be() -> None:
+    for watchdog_ms, allowed_s in ((200, 0.1), (50, 0.025), (60000, 0.5 * SILENT_S)):
+        tables = configuration_for(502).model_dump()
+        tables["festo_cpx"] |= {"watchdog_ms": watchdog_ms}
+        link = DeviceLink.create(multiprocessing.get_context("spawn"), 1)
+        process = DeviceProcess(check(tables), link, multiprocessing.Pipe()[0])
+        assert process._gap_max_s == pytest.approx(allowed_s)
+
+
+@pytest.mark.parametrize("where", ["between", "in a read", "in a write"])
+def test_a_process_that_stood_still_does_not_go_on(rig: Rig, where: str) -> None:
+    """Control went on meanwhile, so that its commands are fresh; only the gap tells."""
+    rig.active()
+    writes = [setpoint.copy() for setpoint in rig.terminal.written]
+    adapter, sleep = rig.process._device._hardware, lambda: time.sleep(GAP_MAX_S + 0.05)
+    if where == "between":
+        sleep()
+    else:
+        name = where.removeprefix("in a ")
+        call = getattr(adapter, name)
+
+        def stalled(*arguments: object) -> object:
+            setattr(adapter, name, call)
+            sleep()
+            return call(*arguments)
+
+        setattr(adapter, name, stalled)
+    rig.write(SOME_PA)
+    if where != "between":
+        step = Thread(target=rig.process.step)
+        step.start()
+        while step.is_alive():  # control never falls silent
+            rig.write(SOME_PA)
+            time.sleep(0.002)
+    else:
+        rig.process.step()
+    assert rig.state == LinkState.LOST
+    rig.run(0.2, SOME_PA)
+    assert rig.state == LinkState.CONNECTED
+    assert np.array_equal(rig.arm.setpoints_pa, ZEROS)
+    with pytest.raises(HardwareError, match=r"connected again|not talked to"):
+        rig.control.read(time.monotonic())
+    if where == "between":
+        assert not any(np.any(counts) for counts in rig.terminal.written[len(writes) :])
+
+
+def test_after_a_pause_the_terminal_is_read_before_it_is_written(rig: Rig) -> None:
+    rig.active()
+    pause_s = rig.process._look_first_s + 0.03
+    assert pause_s < GAP_MAX_S
+    time.sleep(pause_s)
+    rig.terminal.calls.clear()
+    rig.write(SOME_PA)
+    rig.process.step()
+    assert rig.state == LinkState.CONNECTED
+    assert rig.terminal.calls[:3] == ["read", "write", "read"]
 
 
 def first_error(rig: Rig) -> str:
