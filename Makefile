@@ -8,7 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup docs demo faults damage test test-slow test-lowest check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults damage mutants test test-slow test-lowest check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -26,6 +26,11 @@ demo: setup
 # Every fault that docs/safety.md names, TIMES times at random moments; writes its table there.
 faults: setup
 	$(BIN)/python -m tools.faults --times $(TIMES) --write docs/safety.md
+
+# Every small mistake in the modules that safety rests on, one at a time: does a test notice it?
+# MODULES="hardware/guard.py ..." tries these alone; writes its table into docs/safety.md.
+mutants: setup
+	$(BIN)/python -m tools.mutants $(MODULES) --write docs/safety.md
 
 # Logs of several kinds, damaged at random; says what was lost, or that nothing was.
 damage: setup

@@ -53,15 +53,16 @@ class SafeStep:
         slowed = self._slowed(lengths, wish, dt, want, jacobian.T, checks[2])
         after = self._rates(rates, slowed, dt, share)
         moved = lengths + dt * after
-        slack = self._slack(lengths, moved, after, dt, share)
+        slacks = self._left(lengths, moved, after, dt, share)
         rows = symbolic_rows(arm, moved, want, ROWS, whole)
         self.function = CompiledFunction(
             "safe_step",
             [lengths, rates, vector, dt, wish, share, jacobian, checks],
-            [moved, after, ca.vertcat(slack, rows.error_m), rows.transform, rows.tip_jacobian],
+            [moved, after, slacks, rows.error_m, rows.transform, rows.tip_jacobian],
         )
         self.wish, self._share = np.zeros(n), np.zeros(1)
-        self.moved_m, self.rates_m_s, self._scalars, transform, tip = self.function.results
+        results = self.function.results
+        self.moved_m, self.rates_m_s, self._slacks_m, self._error_m, transform, tip = results
         self.tip = TipState(transform[:3, 3], transform[:3, :3], tip)
 
     def bind(
@@ -75,7 +76,7 @@ class SafeStep:
     @property
     def error_m(self) -> float:
         """How far the tasks are from done, after the step."""
-        return float(self._scalars[1])
+        return float(self._error_m[0])
 
     def _slowed(
         self,
@@ -131,8 +132,8 @@ class SafeStep:
         """All chambers slowed down by one share, the most that the acceleration allows."""
         return rates * ca.fmax(0.0, 1.0 - dt / (self._stopping_time(rates) + _TINY))
 
-    def _slack(self, before: ca.SX, moved: ca.SX, rates: ca.SX, dt: ca.SX, share: ca.SX) -> ca.SX:
-        """The least that is left of any limit, in metres; NaN if any of it is.
+    def _left(self, before: ca.SX, moved: ca.SX, rates: ca.SX, dt: ca.SX, share: ca.SX) -> ca.SX:
+        """What is left of every limit (k,), in metres; CasADi's own minimum would drop a NaN.
 
         What is no convex set is looked at in places, so braking needs room for what lies between:
         half of a margin, or what there is of it already. A chamber that is vented to the last
@@ -147,8 +148,7 @@ class SafeStep:
                 continue
             room = ca.fmax(0.0, ca.fmin(0.5 * limit.margin_m, limit.slack(before)))
             slacks += [limit.slack(place) - (share > 0.0) * room for place in places]
-        every = ca.vertcat(*slacks)
-        return ca.mmin(every) + 0.0 * ca.sum1(every)  # the minimum itself would drop a NaN
+        return ca.vertcat(*slacks)
 
     def take(self, wish: Array | None) -> None:
         """Make the step nearest to a wish (n,), in units of the largest rates; None brakes.
@@ -166,14 +166,14 @@ class SafeStep:
     def _allowed(self, share: float, floor: float) -> bool:
         self._share[0] = share
         self.function.evaluate()
-        return bool(self._scalars[0] >= floor)  # never true of a NaN
+        return bool((self._slacks_m >= floor).all())  # never true of a NaN
 
     def _floor(self) -> float:
         """What must be left: nothing, or where a limit is exceeded already, what is left now."""
         wish, rates = self.wish.copy(), self._rates_before.copy()
         self._stand()
         self.wish[:], self._rates_before[:] = wish, rates
-        return min(0.0, float(self._scalars[0])) - _ROUNDING_M
+        return min(0.0, float(self._slacks_m.min())) - _ROUNDING_M
 
     def _stand(self) -> None:
         self.wish[:], self._rates_before[:] = 0.0, 0.0

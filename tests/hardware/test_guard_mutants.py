@@ -1,25 +1,26 @@
 """Every small mistake in the guard is found by its checks: no mutant survives."""
 
 import inspect
+import sys
+from types import ModuleType
 
 import numpy as np
 
 from pneuarm.hardware import guard
 from tests.hardware.guard_checks import CHECKS
-from tests.hardware.mutants import load, mutants
+from tools.mutants.changes import mutants
+from tools.mutants.modules import equivalent
 
-#: Mutants that do the same as the guard, and why.
-EQUIVALENT: dict[str, str] = {
-    "Guard.check: if (supplied == pressures_pa).all(): ... -> pass": "only saves time: where no "
-    "stage changed anything, _why finds nothing either",
-    "Guard.check: return Guarded(supplied, Intervention.NOTHING) -> pass": "the same",
-    "Guard._supplied: if self._flow_max_pa_s == inf: ... -> pass": "only saves time: no sum is "
-    "above an infinite one",
-    "Guard._supplied: return wanted -> pass": "the same, for the first of the two",
-    "Guard._supplied: float(rises.sum()) -> rises.sum()": "a numpy number in place of Python's",
-    "Guard._supplied: needed > largest -> needed >= largest": "where both are equal the factor is "
-    "one, and nothing is shortened",
-}
+#: Mutants that do the same as the guard.
+EQUIVALENT = equivalent()["hardware/guard.py"]
+
+
+def load(source: str) -> ModuleType:
+    """Run a mutant's source as a module of its own."""
+    module = ModuleType("mutant")
+    sys.modules["mutant"] = module  # dataclasses look their module up
+    exec(compile(source, "<mutant>", "exec"), module.__dict__)
+    return module
 
 
 def killer(source: str) -> str:

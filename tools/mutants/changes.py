@@ -1,10 +1,14 @@
-"""Mutants of a module: every small mistake that somebody could make in it, one at a time."""
+"""Mutants of a module: every small mistake that somebody could make in it, one at a time.
+
+What is no code, or code that says nothing but a sentence, stays: annotations, docstrings, strings.
+"""
 
 import ast
 import copy
-import sys
+import warnings
+from collections import Counter
 from collections.abc import Iterator
-from types import ModuleType
+from types import EllipsisType
 from typing import Any
 
 _COMPARES: dict[type, tuple[type, ...]] = {
@@ -56,7 +60,8 @@ def _changed_constants(node: ast.expr) -> Iterator[ast.expr]:
     if isinstance(node, ast.Constant) and isinstance(node.value, bool):
         yield ast.Constant(not node.value)
     elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-        yield ast.Constant(node.value + 1)
+        larger = 2.0 * node.value if isinstance(node.value, float) else node.value + 1
+        yield ast.Constant(larger or 1.0)
         if node.value:
             yield ast.Constant(-node.value)
 
@@ -109,10 +114,7 @@ def _stored(target: Any) -> Any:
 
 
 def _places(tree: ast.Module) -> Iterator[tuple[str, ast.AST, str, int | None]]:
-    """Every place of code: its function, the node above, the field, the index in a list.
-
-    Annotations and docstrings are no code.
-    """
+    """Every place of code: its function, the node above, the field, the index in a list."""
 
     def walk(node: ast.AST, inside: str) -> Iterator[tuple[str, ast.AST, str, int | None]]:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -121,7 +123,7 @@ def _places(tree: ast.Module) -> Iterator[tuple[str, ast.AST, str, int | None]]:
             if field in ("annotation", "returns"):
                 continue
             for index, child in enumerate(value if isinstance(value, list) else [value]):
-                if not isinstance(child, ast.AST) or _is_docstring(child):
+                if not isinstance(child, ast.AST) or _is_text(child):
                     continue
                 yield inside, node, field, index if isinstance(value, list) else None
                 yield from walk(child, inside)
@@ -129,18 +131,20 @@ def _places(tree: ast.Module) -> Iterator[tuple[str, ast.AST, str, int | None]]:
     yield from walk(tree, "")
 
 
-def _is_docstring(node: ast.AST) -> bool:
-    return (
+def _is_text(node: ast.AST) -> bool:
+    """Whether a node is a docstring, a sentence with numbers in it, or a protocol's ``...``."""
+    return isinstance(node, ast.JoinedStr) or (
         isinstance(node, ast.Expr)
         and isinstance(node.value, ast.Constant)
-        and isinstance(node.value.value, str)
+        and isinstance(node.value.value, str | EllipsisType)
     )
 
 
 def mutants(source: str) -> Iterator[tuple[str, str]]:
-    """Name and source of every mutant that still compiles; no two have the same source."""
+    """Name and source of every mutant that still compiles; no two have the same of either."""
     tree = ast.parse(source)
     seen = {ast.unparse(tree)}
+    names: Counter[str] = Counter()
     for inside, parent, field, index in _places(tree):
         value = getattr(parent, field)
         node = value if index is None else value[index]
@@ -149,10 +153,22 @@ def mutants(source: str) -> Iterator[tuple[str, str]]:
             continue
         for other in changes(node):  # type: ignore[arg-type]
             text = _with(tree, parent, field, index, node, other)
-            if text not in seen:
+            if text not in seen and _compiles(text):
                 seen.add(text)
                 before, after = (ast.unparse(ast.fix_missing_locations(n)) for n in (node, other))
-                yield f"{inside}: {_short(before)} -> {_short(after)}", text
+                name = f"{inside}: {_short(before)} -> {_short(after)}".removeprefix(": ")
+                names[name] += 1
+                yield name if names[name] == 1 else f"{name} ({names[name]})", text
+
+
+def _compiles(text: str) -> bool:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)  # of what is nonsense, and will be killed
+        try:
+            compile(text, "<mutant>", "exec")
+        except SyntaxError:
+            return False
+    return True
 
 
 def _short(text: str) -> str:
@@ -174,11 +190,3 @@ def _with(
     else:
         getattr(parent, field)[index] = node
     return text
-
-
-def load(source: str) -> ModuleType:
-    """Run a mutant's source as a module of its own."""
-    module = ModuleType("mutant")
-    sys.modules["mutant"] = module  # dataclasses look their module up
-    exec(compile(source, "<mutant>", "exec"), module.__dict__)
-    return module

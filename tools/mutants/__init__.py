@@ -1,0 +1,1 @@
+"""Which mistakes in the code that safety rests on no test would notice."""
