@@ -51,7 +51,7 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/mypy --python-version 3.10 $(CLIENT)
+	$(BIN)/mypy --python-version 3.10 --follow-imports silent $(CLIENT)
 	$(BIN)/lint-imports
 
 # Everything behind docs/validation.md: figures, workspace, table 1, gravity, models, pictures.
@@ -67,7 +67,7 @@ bench: bench-setup
 bench-setup: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 
-# The tables of docs/ that stand in the code: keys, messages, faults, modes.
+# The tables of docs/ that stand in the code: keys, messages, configuration, faults, modes, rooms.
 docs: setup
 	$(BIN)/python -m tools.docs
 

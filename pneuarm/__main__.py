@@ -57,7 +57,8 @@ def _why_not_loaded(error: Exception) -> str:
     if isinstance(error, ModuleNotFoundError) and error.name == "pneuarm.service.cli":
         return (  # which the distribution of the client leaves out
             "only the client is installed here, `from pneuarm import Client`; the daemon and the "
-            f"commands come with `pip install pneuarm=={__version__}`"
+            "commands come with `pip install ./distributions/client .` in the checkout of "
+            f"pneuarm {__version__}"
         )
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"the command line cannot be loaded: {what}"

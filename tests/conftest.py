@@ -1,7 +1,8 @@
-"""How the tests are shared between two workers.
+"""How the tests are shared between two workers, and which are done again.
 
 Tests that run real processes, daemons above all, go one after another on one worker: two real-time
-loops on two cores would make each other late. Everything else goes on beside them.
+loops on two cores would make each other late. Everything else goes on beside them. Where the
+machine makes such a daemon late all the same, the test is done again: tools.rig.interruptions.
 """
 
 import subprocess
@@ -9,7 +10,14 @@ from types import ModuleType
 
 import pytest
 
+from tools.rig.interruptions import DoneAgain
+
 _REAL = ("tools.rig.daemon", "tools.rig.wire", "tools.rig.emulators", "tools.faults")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let tests be done again in which the machine made an arm hold."""
+    config.pluginmanager.register(DoneAgain())
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -3,13 +3,18 @@
 import ast
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pneuarm.controllers.workspace.workspace import Workspace
 from pneuarm.hardware.device import Device, EmulatedDevice
+from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import ALIVE_CLIENT, ALIVE_DAEMON, TOPICS
 from pneuarm.service.cli.parser import build_parser
+from pneuarm.service.cli.text import outcome
 from pneuarm.service.configuration.configuration import load
 from pneuarm.service.configuration.devices import AnyDevice, devices
 from pneuarm.service.monitors.fault import Policy
@@ -170,29 +175,53 @@ def test_python_on_a_page_compiles(page: Path) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_every_room_stands_in_the_drawing_of_the_house(package: str) -> None:
+def test_the_drawing_of_the_house_has_the_floors_of_the_contracts(package: str) -> None:
     (drawing,) = re.findall(
-        rf"^    {package} .*?(?=^    -----|^$)", (DOCS / "architecture.md").read_text(), re.M | re.S
+        rf"^    {package} (.*?)(?=^    -----|^$)",
+        (DOCS / "architecture.md").read_text(),
+        re.M | re.S,
     )
-    rooms = {init.parent.name for init in (ROOT / package).glob("*/__init__.py")}
-    assert rooms <= set(re.findall(r"\w+", drawing))
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    (layers,) = (
+        contract["layers"]
+        for contract in settings["contracts"]
+        if contract.get("containers") == [f"pneuarm.{package}"]
+    )
+    drawn = [set(re.findall(r"\w+", row)) for row in drawing.strip().splitlines()]
+    assert drawn == [set(re.findall(r"\w+", layer)) for layer in layers]
 
 
 # --- what is named exists ------------------------------------------------------------------------
 
-#: Files and folders of the project itself, as a page names them.
-TOP = ("controllers", "hardware", "logs", "service", "tests", "tools", "docs")
+#: Files and folders of the project itself, as a page names them; also with wildcards.
+TOP = ("controllers", "hardware", "logs", "service", "tests", "tools", "docs", "examples")
 PATH = re.compile(rf"`((?:{'|'.join(TOP)})/[\w./*-]*)`")
-#: A Python file without its folder.
-FILE = re.compile(r"`(\w+\.py)`")
+#: Files of the project without their folder, also with wildcards.
+FILE = re.compile(r"`([\w*?\[\]-]+\.(?:py|toml|proto|md|lock|csv))`")
+#: Files that a page tells the reader to make.
+OWN = {"bench.toml", "calibration.toml", "pneuarm.toml"}
+#: Folder of the files that a table names, in the heading of its first column.
+FOLDER = re.compile(r"^\| file in `([\w/]+)/` \|.*\n(?:\|.*\n)+", re.M)
 
 
 @each_page
 def test_every_path_that_is_named_exists(page: Path) -> None:
     for name in PATH.findall(page.read_text()):
         assert list(ROOT.glob(name.rstrip("/"))), f"{name} does not exist"
-    for name in FILE.findall(page.read_text()):
-        assert any(next((ROOT / top).rglob(name), None) for top in TOP), f"no {name}"
+    for name in set(FILE.findall(page.read_text())) - OWN:
+        here = [*ROOT.glob(name), *(found for top in TOP for found in (ROOT / top).rglob(name))]
+        assert here, f"no {name}"
+
+
+def test_every_file_in_the_table_of_a_folder_is_in_that_folder_and_none_is_left_out() -> None:
+    tables = [found for page in PAGES for found in FOLDER.finditer(page.read_text())]
+    assert tables
+    for found in tables:
+        folder, rows = ROOT / found[1], found[0].partition("\n")[2]
+        named = first_cells(rows)
+        assert all((folder / name).exists() for name in named), f"{found[1]}: {named}"
+        modules = {path.name for path in folder.glob("*.py")} - {"__init__.py"}
+        assert modules <= named
 
 
 @each_page
@@ -253,3 +282,38 @@ def test_every_command_in_a_sentence_exists(page: Path) -> None:
     help_text = build_parser().format_help()
     for command in MENTION.findall(page.read_text()):
         assert re.search(rf"^ +{command}\b", help_text, re.M), f"there is no `pneuarm {command}`"
+
+
+# --- what the README shows is what the program says ----------------------------------------------
+
+
+def shown(command: str) -> str:
+    """Return the line that the README shows below a command."""
+    lines = (ROOT / "README.md").read_text().splitlines()
+    return lines[lines.index(f"    $ pneuarm {command}") + 1].strip()
+
+
+def numbers(text: str) -> list[float]:
+    return [float(value) for value in re.findall(r"-?\d+\.\d+", text)]
+
+
+def test_a_target_within_and_one_out_of_reach_end_as_the_readme_shows() -> None:
+    near = shown("send position 60 20 190 --enable")
+    x, y, z, error = numbers(near)
+    reached = pb.ArmState(reach=pb.REACHED, target_error_m=1e-3 * error)
+    reached.tip_estimated_position_m.extend(1e-3 * value for value in (x, y, z))
+    assert near == f"{outcome(reached)}; the arm holds"
+
+    command = "send position 300 0 100 --enable"
+    answer = Workspace(load(preset="paper").build_arm()).is_reachable(np.array([0.3, 0.0, 0.1]))
+    away = pb.ArmState(reach=pb.OUT_OF_REACH, binding_limits=answer.limits)
+    away.target_error_m = answer.distance_m
+    away.tip_commanded_position_m.extend(answer.nearest_m)
+    there = f"{outcome(away)}; the arm holds"
+    assert re.sub(r"-?\d+\.\d+", "", shown(command)) == re.sub(r"-?\d+\.\d+", "", there)
+    assert numbers(shown(command)) == pytest.approx(numbers(there), abs=0.15)
+
+
+@each_page
+def test_commands_are_written_for_the_activated_environment(page: Path) -> None:
+    assert not re.search(r"\.venv/bin/(?!activate)", page.read_text())

@@ -20,7 +20,7 @@ import casadi as ca
 import numpy as np
 
 from pneuarm.controllers.actuation.symbols import is_plain, symbolic_lengthening, symbolic_unloaded
-from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 
 #: A Newton step below this (m) is the last, which leaves an error of some 1e-13 m; one that needs
@@ -129,6 +129,5 @@ def length_bounds_m(arm: Arm) -> tuple[Array, Array]:
     interval of Eq. (4) by LENGTH_MARGIN_M.
     """
     pressure_low, pressure_high = pressure_length_bounds_m(arm)
-    low = np.maximum(arm.per_chamber("length_min_m") + LENGTH_MARGIN_M, pressure_low)
-    high = np.minimum(arm.per_chamber("length_max_m") - LENGTH_MARGIN_M, pressure_high)
-    return low, high
+    shortest, longest = arm.length_interval_m
+    return np.maximum(shortest, pressure_low), np.minimum(longest, pressure_high)

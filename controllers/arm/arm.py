@@ -188,6 +188,16 @@ class Arm:
         return _frozen(np.repeat(self.per_section(field), 3, axis=1))
 
     @cached_property
+    def length_interval_m(self) -> tuple[Array, Array]:
+        """Shortest and longest lengths ``(n_sections, 3)`` that a chamber may be told to take.
+
+        Eq. (4) is ``l0/2 < l < 3 l0/2``; the arm says its own ends, and LENGTH_MARGIN_M keeps off.
+        """
+        low = self.per_chamber("length_min_m") + LENGTH_MARGIN_M
+        high = self.per_chamber("length_max_m") - LENGTH_MARGIN_M
+        return _frozen(low), _frozen(high)
+
+    @cached_property
     def rest_lengths_m(self) -> Array:
         """Chamber lengths of the vented arm without load, ``(n_sections, 3)``."""
         return self.per_chamber("rest_length_m")

@@ -12,7 +12,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.geometry.rotations import rotation_vectors
 from pneuarm.controllers.kinematics import checks
 from pneuarm.controllers.kinematics.constant_curvature import (
@@ -78,9 +78,7 @@ def within_limits(arm: Arm, lengths_m: Array) -> Array:
 
     Unbending moves a length toward the mean of its section, so Eq. (4) holds after it.
     """
-    low = arm.per_chamber("length_min_m") + LENGTH_MARGIN_M
-    high = arm.per_chamber("length_max_m") - LENGTH_MARGIN_M
-    lengths = np.clip(lengths_m, low, high)
+    lengths = np.clip(lengths_m, *arm.length_interval_m)
     offset, most = arm.per_section("chamber_offset_m"), arm.per_section("bend_max_rad")
     shapes = shapes_from_lengths(lengths, offset)
     theta = np.hypot(shapes[..., 1:2], shapes[..., 2:3])

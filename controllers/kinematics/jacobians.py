@@ -2,7 +2,9 @@
 
 With the rotation vector ``w = (-v, u, 0)`` a section's rotation is ``exp([w])`` and its tip lies at
 ``L J z``, where ``J = 1 + C [w] + E [w]^2`` is the left Jacobian of the rotations and z the third
-unit vector. So the tip turns with ``J w_dot`` and nothing divides by the bending angle.
+unit vector. So the tip turns with ``J w_dot`` and nothing divides by the bending angle. The paper's
+Jacobian over ``(phi, theta, r)``, Eq. (2) and (3), is that of
+:mod:`pneuarm.controllers.kinematics.serial_chain`.
 
 A *station* names a point of the backbone: its whole part counts the sections below it, the rest is
 the fraction of the section it lies in; 0 is the base, ``n_sections`` the tip. A Jacobian is that of

@@ -1,8 +1,10 @@
 """The paper's serial robot and its equations (1), (2) and (3): the reference, not what runs.
 
 The parameters ``(phi, theta, r)`` have no meaning for the straight arm (r is infinite), so the
-controllers use :mod:`pneuarm.controllers.kinematics.constant_curvature` and the tests compare the
-two. Everything is defined for batches: ``phi_rad``, ``theta_rad``, ``radius_m`` broadcast to
+controllers use :mod:`pneuarm.controllers.kinematics.constant_curvature` in the place of Eq. (1) and
+:mod:`pneuarm.controllers.kinematics.jacobians` in that of Eq. (2) and (3), and the tests compare
+them. Eq. (4) is a limit: :mod:`pneuarm.controllers.limits.length`.
+Everything is defined for batches: ``phi_rad``, ``theta_rad``, ``radius_m`` broadcast to
 ``(...)``.
 """
 

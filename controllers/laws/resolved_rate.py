@@ -25,10 +25,10 @@ class ResolvedRate:
 
     def wish(self, problem: IkProblem) -> Array | None:
         """Return rates (n_chambers,) in units of the largest ones; None if they are not finite."""
+        if not np.isfinite(problem.checks[1]):
+            return None  # else numpy warns of it, and then raises
         jacobian, base = problem.jacobian, problem.base
         rate = problem.rate - jacobian @ base
-        if not np.isfinite(problem.checks[1]):
-            return None  # else numpy raises
         squares, directions = np.linalg.eigh(jacobian @ jacobian.T)
         damping = DAMPING**2 * np.maximum(0.0, 1.0 - squares / NEAR_SINGULAR**2)
         along = (directions.T @ rate) / (np.maximum(squares, 0.0) + damping)

@@ -1,25 +1,28 @@
-"""Chamber lengths inside Eq. (4) and inside what the pressure range can reach."""
+"""How long a chamber may be: Eq. (4), ``l0/2 < l < 3 l0/2``, and what the pressures reach.
+
+The ends of Eq. (4) are the section's ``length_min_m`` and ``length_max_m``, from the configuration.
+"""
 
 import casadi as ca
 import numpy as np
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
-from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.limits.limit import Limit, column
 
 
 class LengthLimit(Limit):
-    """Keeps every length strictly inside the open interval of Eq. (4)."""
+    """Keeps every length inside the open interval of Eq. (4), and inside the pressures' reach."""
 
     name, bit = "length", 1
+    words = "length, Eq. (4)"
     margin_m = 1e-7
     convex = two_sided = in_workspace = True
 
     def __init__(self, arm: Arm) -> None:
         super().__init__(arm)
         self._lower_m, self._upper_m = length_bounds_m(arm)
-        self._shortest_m = arm.per_chamber("length_min_m") + LENGTH_MARGIN_M
-        self._longest_m = arm.per_chamber("length_max_m") - LENGTH_MARGIN_M
+        self._shortest_m, self._longest_m = arm.length_interval_m
 
     def slack(self, lengths: ca.SX) -> ca.SX:
         """Distances to the lower bounds, then to the upper ones."""

@@ -26,6 +26,8 @@ class Limit(ABC):
     #: How the limit is called where it stops the arm, and its bit in ``binding_limits``.
     name: ClassVar[str]
     bit: ClassVar[int]
+    #: The same for people, where the name alone does not say which of the paper's equations it is.
+    words: ClassVar[str] = ""
     #: What the QP leaves: along a curved bound a straight step needs room; OSQP has a tolerance.
     margin_m: ClassVar[float]
     #: Less than this (m) is left where the limit is what stops the arm.

@@ -43,6 +43,11 @@ def names(bits: int) -> tuple[str, ...]:
     return tuple(kind.name for kind in KINDS if kind.bit & bits)
 
 
+def words(bits: int) -> str:
+    """Name the limits whose bits are set for people; "" where none is."""
+    return " and ".join(kind.words or kind.name for kind in KINDS if kind.bit & bits)
+
+
 def workspace_is_exact(arm: Arm) -> bool:
     """Whether the workspace of an arm is known exactly, with every limit, for its own tip."""
     return (

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m, pressure_length_bounds_m
-from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm, Array
+from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
 from pneuarm.controllers.limits.bend import BendLimit
@@ -42,8 +42,8 @@ class LimitNames:
         self.bend_max_rad = arm.per_section("bend_max_rad")[:, 0]
         self.offset_m = arm.per_section("chamber_offset_m")
         low, high = pressure_length_bounds_m(arm)
-        self._low_is_pressure = low > arm.per_chamber("length_min_m") + LENGTH_MARGIN_M
-        self._high_is_pressure = high < arm.per_chamber("length_max_m") - LENGTH_MARGIN_M
+        shortest, longest = arm.length_interval_m
+        self._low_is_pressure, self._high_is_pressure = low > shortest, high < longest
 
     def within(self, lengths_m: Array, margin_m: float) -> int:
         """Limits of which less than ``margin_m`` is left; a negative margin means exceeded.

@@ -11,8 +11,8 @@ from pneuarm.controllers.arm.arm import Arm
 from pneuarm.hardware.channels import Channels, valves_or_all
 from pneuarm.hardware.device import Address, EmulatedDevice, Emulation
 from pneuarm.hardware.interface import Hardware
-from pneuarm.hardware.tables.serial import ConnectTimeout, SerialConfig, Timeout
 from pneuarm.hardware.tables.table import BAR, Positive
+from pneuarm.hardware.transports.serial_table import ConnectTimeout, SerialConfig, Timeout
 
 if TYPE_CHECKING:
     from pneuarm.hardware.emulation.emulation import EmulatedArm

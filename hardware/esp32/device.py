@@ -13,8 +13,8 @@ from pneuarm.hardware.channels import Channels, valves_or_all
 from pneuarm.hardware.device import Address, EmulatedDevice, Emulation
 from pneuarm.hardware.esp32.protocol import CHAMBERS
 from pneuarm.hardware.interface import Hardware
-from pneuarm.hardware.tables.serial import ConnectTimeout, SerialConfig, Timeout
 from pneuarm.hardware.tables.table import BAR
+from pneuarm.hardware.transports.serial_table import ConnectTimeout, SerialConfig, Timeout
 
 if TYPE_CHECKING:
     from pneuarm.hardware.emulation.emulation import EmulatedArm

@@ -1,1 +1,1 @@
-"""What the two Festo terminals share: their watchdog, and its emulation."""
+"""What the two Festo terminals share: keys and wiring, counts, watchdog, emulation. No device."""

@@ -6,18 +6,8 @@ diagnosis. Addresses are zero-based protocol addresses.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import copysign
 
-import numpy as np
-
-from pneuarm.controllers.arm.arm import Array
 from pneuarm.hardware.transports.modbus import from_signed, runs, to_signed
-
-#: Pa of one count.
-COUNT_PA = 100.0
-
-#: A command this near (counts) below a count is that count: 300 mbar is never sent as 299.
-_COUNT_TOLERANCE = 1e-6
 
 #: The standard numbering of faults on Festo's CPX terminals.
 _DIAGNOSES = {
@@ -95,17 +85,6 @@ class CpxInputs:
     actual: list[int]
     setpoint: list[int]
     diagnosis: list[int]
-
-
-def counts_of(pressures_pa: Array) -> list[int]:
-    """Return whole counts, flat: the nearest that are no further from ambient than asked for."""
-    flat: list[float] = pressures_pa.reshape(-1).tolist()
-    return [int(value / COUNT_PA + copysign(_COUNT_TOLERANCE, value)) for value in flat]
-
-
-def pressures_of(counts: list[int], n_sections: int) -> Array:
-    """Return gauge pressures (n_sections, 3) in Pa."""
-    return np.array(counts, dtype=np.float64).reshape(n_sections, 3) * COUNT_PA
 
 
 def complaint(valve: int, diagnosis: int) -> str:

@@ -9,8 +9,8 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.checked import checked_command
+from pneuarm.hardware.festo.counts import counts_of, pressures_of
 from pneuarm.hardware.festo.terminal_watchdog import KeptWatchdog, TerminalWatchdog
-from pneuarm.hardware.festo_cpx.protocol import counts_of, pressures_of
 from pneuarm.hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
     IDLE,

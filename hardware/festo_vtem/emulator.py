@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.counts import COUNT_PA
+from pneuarm.hardware.festo.emulated_registers import measured_counts, read_from
 from pneuarm.hardware.festo.emulated_watchdog import EmulatedWatchdog
 from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
-from pneuarm.hardware.festo_cpx.emulator import measured_counts, read_from
-from pneuarm.hardware.festo_cpx.protocol import COUNT_PA
 from pneuarm.hardware.festo_vtem.protocol import (
     ACKNOWLEDGE_COMMAND,
     IDLE,

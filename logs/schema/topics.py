@@ -20,7 +20,8 @@ class Topic:
     ``message`` is None where anything may be sent; ``rate_hz`` is the rate of publication, and
     ``when`` says in words what a rate does not; ``logged_rate_hz`` is the rate in the file, None
     for "every one". ``newest`` says that the newest message also answers queries, ``reply`` what
-    a query with a ``message`` is answered by; a query without one is answered by ``message``.
+    a query with a ``message`` is answered by; a query without one is answered by ``message``. A key
+    that programs put may be queried too where it has a ``reply``. ``suffix`` may follow the key.
     """
 
     key: str
@@ -32,13 +33,14 @@ class Topic:
     when: str = ""
     newest: bool = False
     reply: type[Message] | None = None
+    suffix: str = ""
 
 
 TARGET = Topic("cmd/target", "in", pb.Target, when="at least every 200 ms while the arm is to move")
 #: Of the stop and of a change of mode the event that follows is logged.
-ESTOP = Topic("cmd/estop", "in", None, logged=False, when="when needed")
+ESTOP = Topic("cmd/estop", "in", None, reply=pb.Reply, logged=False, when="when needed")
 MODE = Topic("cmd/mode", "query", pb.ModeRequest, reply=pb.Reply, logged=False, when="when needed")
-TIP_POSE = Topic("sensor/tip_pose", "in", PoseInFrame, when="any")
+TIP_POSE = Topic("sensor/tip_pose", "in", PoseInFrame, when="any", suffix="/<source>")
 STATE = Topic("state", "out", pb.ArmState, 100.0, newest=True, when="every tick in the log")
 TIP = Topic("tip", "out", PoseInFrame, 100.0, logged_rate_hz=100.0, newest=True)
 TF = Topic("tf", "out", FrameTransforms, 100.0, logged_rate_hz=100.0, newest=True)

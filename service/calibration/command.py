@@ -11,7 +11,6 @@ import numpy as np
 from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
 from pneuarm.controllers.calibration.plan import duration_s, plan
 from pneuarm.controllers.calibration.recording import Recording
-from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.calibration import broken_off
 from pneuarm.service.calibration.drive import Progressed, ask, progress, record, require_tip
 from pneuarm.service.calibration.files import calibrated, require_folder, toml_text, write_whole
@@ -28,6 +27,7 @@ from pneuarm.service.calibration.values import (
 )
 from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import Configuration, recorded
+from pneuarm.service.pictures.pyplot import pyplot
 
 _TOML, _PAGE = "calibration.toml", "calibration.html"
 

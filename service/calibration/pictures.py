@@ -9,8 +9,8 @@ import numpy as np
 from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.excitation import place
 from pneuarm.hardware.tables.table import BAR, MM
-from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.calibration.values import errors_mm
+from pneuarm.service.pictures.pyplot import pyplot
 
 _BEFORE, _AFTER, _MEASURED = "#d08a3c", "#1f6fb2", "#222222"
 #: Of the pressure range: a chamber below this counts as not moved.

@@ -84,7 +84,7 @@ def _add_daemon(commands: Subparsers) -> None:
         commands,
         "demo",
         "pneuarm.service.demo.demo:demo",
-        "Daemon and client as processes: circle, eight, ...",
+        "Draw an eight: uncalibrated, calibrated, tip measured; or with an emulated device.",
     )
     demo.add_argument(
         "--seconds", type=number(1, 3600), default=30.0, help="length of the show (default 30)"

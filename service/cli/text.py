@@ -18,10 +18,10 @@ def bars(values_pa: Iterable[float]) -> str:
 
 
 def binding(flags: int) -> str:
-    """Names of the limits that bind."""
-    from pneuarm.controllers.limits.limits import names  # CasADi with it: only where it is needed
+    """Name the limits that bind."""
+    from pneuarm.controllers.limits.limits import words  # CasADi with it: only where it is needed
 
-    return " and ".join(names(flags)) or "no limit"
+    return words(flags) or "no limit"
 
 
 def state_line(state: pb.ArmState) -> str:

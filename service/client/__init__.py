@@ -1,1 +1,1 @@
-"""The user's own program: the client and its targets. No solver, no Rerun, no MCAP."""
+"""What a user's program imports: the client and its targets. No solver, no Rerun, no MCAP."""

@@ -1,4 +1,4 @@
-"""The kinds of device: those in the folders of this package, and those of other packages.
+"""The kinds of device that a configuration may name: ours, and those of other packages.
 
 A folder under `hardware/` or `logs/` with a `device.py` is a device: its object is `DEVICE`. Other
 packages register theirs by the entry point group `pneuarm.devices`. One of these that cannot be

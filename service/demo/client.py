@@ -17,14 +17,24 @@ import numpy as np
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
 from pneuarm.controllers.arm.arm import Arm
-from pneuarm.controllers.arm.errors import HardwareError, ModeRefused, TargetRejected
+from pneuarm.controllers.arm.errors import (
+    DaemonUnreachable,
+    HardwareError,
+    ModeRefused,
+    MoveTimeout,
+    TargetRejected,
+)
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import check
 
 _RATE_HZ = 100.0
-_CAMERA_S = 10.0
+_CAMERA_S = 60.0
 _TRIES = 4
+
+#: After an interruption, s: the gateway may just be started again.
+_PAUSE_S = 0.5
+
 _TURN_S = 4.0
 
 #: Step of time (s) for the velocity along a path.
@@ -91,18 +101,31 @@ def draw_figures(
 
 
 def _persist(client: Client, act: Callable[[], T]) -> T:
-    """Do something; where a busy machine made the arm hold, arm again and do it anew.
+    """Do something; where a busy machine made the arm stop, arm again and do it anew.
 
     Nobody stands beside the arm of a show; a program that moves a real one must ask first.
     """
     for _ in range(_TRIES):
         try:
+            _arm(client)
             return act()
-        except (ModeRefused, TargetRejected) as error:
+        except (ModeRefused, TargetRejected, MoveTimeout, DaemonUnreachable) as error:
             print(f"\ninterrupted ({error}); once more", file=sys.stderr)
-            client.enable()
+            time.sleep(_PAUSE_S)
             client.events()
+    _arm(client)
     return act()
+
+
+def _arm(client: Client) -> None:
+    """Take the lease and arm; an arm that is active already stays so, a fault is left first."""
+    mode = client.state().mode
+    if mode == pb.FAULT:
+        client.reset()
+    if mode == pb.ACTIVE:
+        client.take_lease()
+    else:
+        client.enable()
 
 
 def _wait_for_camera(client: Client) -> None:
@@ -120,7 +143,6 @@ def main() -> int:
     wanted = json.loads(sys.argv[3])
     arm = check(tomllib.loads(sys.stdin.read())).build_arm()
     with Client(name, endpoint, "demo") as client:
-        client.enable()
         if wanted["camera"]:
             _wait_for_camera(client)
         phases = draw_figures(client, arm, wanted["label"], wanted["seconds"])

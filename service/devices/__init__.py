@@ -1,1 +1,1 @@
-"""The device process, and the table of devices with their wiring. The only hand on a device."""
+"""The device process, the only hand on a device that may wait; wiring and addresses checked."""

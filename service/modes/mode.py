@@ -1,9 +1,13 @@
 """The mode machine: a pure table of mode and event.
 
-    idle --vented--> ready --enable--> active <--enable-- hold
-      ^                                  |  hold, stale target, lease lost, gateway silent  ^
-      |                                  +---------------------------------------------------+
-      +-- vent, hold timeout, gateway lost, disk full -- active, hold
+    idle --vented--> ready --enable--> active --(a)--> hold
+      ^                                  | ^             |
+      |                                  | +--- enable --+
+      +----------------(b)---------------+---------------+
+
+    (a) HOLD, TARGET_STALE, LEASE_LOST, LEASE_RELEASED, GATEWAY_SILENT, DISK_FULL, FAULT_HOLD
+    (b) VENT, HOLD_TIMEOUT, GATEWAY_LOST, DISK_STILL_FULL
+
     fault and estop come from every mode, are latched, and are left only by reset, to idle.
 
 idle, ready, fault and estop are vented; active and hold keep air in the arm.

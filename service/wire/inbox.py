@@ -14,7 +14,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import MessageRejected, TargetRejected
-from pneuarm.controllers.limits.limits import names, workspace_is_exact
+from pneuarm.controllers.limits.limits import words, workspace_is_exact
 from pneuarm.controllers.targets.same import is_near
 from pneuarm.controllers.targets.targets import PositionTarget, Target
 from pneuarm.controllers.workspace.reachability import Reachability
@@ -153,12 +153,11 @@ class Inbox:
         return replace(target, nearest_lengths_m=lengths)
 
     def _tell_out_of_reach(self, answer: Reachability, client: str) -> None:
-        binding = " and ".join(names(answer.limits))
         nearest = ", ".join(f"{1e3 * value:.1f}" for value in answer.nearest_m)
         self._notes.tell(
             "out_of_reach",
-            f"the target is out of reach: {binding} binds; the nearest reachable point is "
-            f"({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
+            f"the target is out of reach: {words(answer.limits)} binds; the nearest "
+            f"reachable point is ({nearest}) mm, {1e3 * answer.distance_m:.1f} mm away",
             client,
         )
 

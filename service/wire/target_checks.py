@@ -1,4 +1,4 @@
-"""A message becomes a target only through here, by what its kind says of it."""
+"""A message becomes a target, or a measured tip pose, only through here."""
 
 from typing import Any
 

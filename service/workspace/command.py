@@ -11,8 +11,8 @@ from pneuarm.controllers.actuation.pressure_map import length_bounds_m, pressure
 from pneuarm.controllers.arm.arm import LENGTH_MARGIN_M, Arm
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.controllers.workspace.summary import Summary, summarise
-from pneuarm.logs.view.pyplot import pyplot
 from pneuarm.service.configuration.configuration import load
+from pneuarm.service.pictures.pyplot import pyplot
 
 _MM, _LITRES = 1e3, 1e3
 

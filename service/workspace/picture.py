@@ -11,7 +11,7 @@ from pneuarm.controllers.workspace.sampling import Samples, samples_of
 from pneuarm.controllers.workspace.summary import Summary
 from pneuarm.logs.view import colors as colors
 from pneuarm.logs.view.geometry import ArmShape
-from pneuarm.logs.view.pyplot import pyplot
+from pneuarm.service.pictures.pyplot import pyplot
 from pneuarm.service.workspace.poses import typical_lengths
 
 _MM = 1e3

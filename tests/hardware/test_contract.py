@@ -13,15 +13,15 @@ from pneuarm.hardware.ctrl_p.protocol import STEP_PA as CTRL_P_STEP_PA
 from pneuarm.hardware.esp32.device import DEVICE as ESP32
 from pneuarm.hardware.esp32.protocol import PASS_S as ESP32_PASS_S
 from pneuarm.hardware.esp32.protocol import STEP_PA as ESP32_STEP_PA
+from pneuarm.hardware.festo.counts import COUNT_PA
 from pneuarm.hardware.festo_cpx.device import DEVICE as FESTO_CPX
-from pneuarm.hardware.festo_cpx.protocol import COUNT_PA
 from pneuarm.hardware.festo_vtem.device import DEVICE as FESTO_VTEM
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.logs.reading.device import DEVICE as REPLAY
 from pneuarm.service.devices import registry
 from pneuarm.service.devices.contract import Bench, DeviceContract
 from tests.hardware.arms import ARMS
-from tests.hardware.festo_bench import festo_cpx, festo_vtem
+from tests.hardware.festo.festo_bench import festo_cpx, festo_vtem
 from tests.logs.reading.test_replay_device import record
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from pneuarm import __version__
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from tests.packaging.building import environment, only_what_it_asks_for, run
 from tools.rig.daemon import Daemon
@@ -69,5 +70,6 @@ def test_command_without_the_daemon_says_what_to_install(
         [client_alone / "pneuarm", "run"], cwd=tmp_path, capture_output=True, text=True, timeout=30
     )
     assert done.returncode == 1
-    assert "pip install pneuarm==" in done.stderr
+    assert "pip install ./distributions/client ." in done.stderr
+    assert __version__ in done.stderr
     assert len(done.stderr.splitlines()) == 1

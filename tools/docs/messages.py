@@ -137,12 +137,17 @@ def make_enums(name: str) -> str:
 
 def make_topics(name: str) -> str:
     """Return the keys: what is said under each, in which direction, how often."""
-    rows = [[f"`{topic.key}`", *_topic(topic)] for topic in TOPICS]
+    rows = [[_key(topic), *_topic(topic)] for topic in TOPICS]
     return table(("key", "direction", "message", "rate"), rows)
 
 
+def _key(topic: Topic) -> str:
+    return f"`{topic.key}`" + (f", `{topic.key}{topic.suffix}`" if topic.suffix else "")
+
+
 def _topic(topic: Topic) -> list[str]:
-    direction = _DIRECTIONS[topic.direction] + ("; also answers queries" if topic.newest else "")
+    asked = topic.newest or (topic.direction == "in" and topic.reply is not None)
+    direction = _DIRECTIONS[topic.direction] + ("; also answers queries" if asked else "")
     message = "anything, also nothing" if topic.message is None else _message(topic.message)
     if topic.reply is not None:
         message = f"{message}, answered by {_message(topic.reply)}"

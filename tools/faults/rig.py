@@ -65,7 +65,7 @@ class Rig:
     def _start(self) -> None:
         """Start the daemon; a machine with much else to do may take its time."""
         self.daemon.launch()
-        wait_for(self.daemon._answers, lambda: f"an answer; it said: {self.daemon.output()}", 60.0)
+        self.daemon.wait_until_it_answers()
         highest_pa = load(self.daemon.config).build_arm().per_chamber("pressure_max_pa").max()
         self._air_pa = max(2.5 * EMPTY_PA, 0.08 * highest_pa)
 

@@ -1,1 +1,1 @@
-"""Logs on which something is tried."""
+"""Random damage to logs of every kind: what a reader still finds, and whether it says the rest."""

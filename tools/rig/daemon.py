@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import pytest
 import tomli_w
@@ -26,7 +26,13 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import HEALTH
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 25.0
+
+#: After so long without what is waited for, something hangs. No test passes or fails by how fast
+#: the machine is, so it is many times what a busy one needs; what has died is told at once.
+PATIENCE_S = 120.0
+
+#: A start that gets no further for so long hangs.
+STANDSTILL_S = 60.0
 
 _numbers = itertools.count(1)
 T = TypeVar("T")
@@ -59,7 +65,7 @@ def run_command(*arguments: str, **options: Any) -> "subprocess.CompletedProcess
         cwd=ROOT,
         capture_output=True,
         text=True,
-        **({"timeout": 45} | options),
+        **({"timeout": PATIENCE_S} | options),
     )
 
 
@@ -75,6 +81,9 @@ def assert_one_sentence(done: "subprocess.CompletedProcess[str]", *words: str) -
 
 class Daemon:
     """One daemon process with its children."""
+
+    #: Every daemon that was started in this process.
+    launched: "ClassVar[list[Daemon]]" = []
 
     def __init__(self, folder: Path, tables: dict[str, dict[str, Any]] | None = None) -> None:
         """Write the configuration: small and without the live view, but for ``tables``."""
@@ -97,19 +106,38 @@ class Daemon:
             own[name] = own.get(name, {}) | table
         self.config.write_text(tomli_w.dumps(own))
         self.process: subprocess.Popen[bytes] | None = None
+        self._names: dict[int, str] = {}
+        self._broken_ns: dict[str, int] = {}
 
     def start(self) -> "Daemon":
         """Start it and wait until it answers and the arm is ready."""
         self.launch()
         try:
-            wait_for(self._answers, lambda: f"an answer of the daemon; it said: {self.output()}")
+            self.wait_until_it_answers()
         except BaseException:
             self.kill()
             raise
         return self
 
+    def wait_until_it_answers(self) -> None:
+        """Wait for the end of the start for as long as it gets further."""
+        reached, moved_s = self._reached(), time.monotonic()
+        while not self._answers():
+            now_s, further = time.monotonic(), self._reached()
+            if further != reached:
+                reached, moved_s = further, now_s
+            elif now_s - moved_s > STANDSTILL_S:
+                pytest.fail(f"the daemon's start stands still; it said: {self.output()}")
+            time.sleep(0.05)
+
+    def _reached(self) -> object:
+        """Say how far the start is: what was said, who runs, how much is recorded."""
+        sizes = {path.name: path.stat().st_size for path in self.logs.glob("*.mcap")}
+        return len(self.output()), tuple(self._running()), tuple(sizes.items())
+
     def launch(self) -> None:
         """Start the process."""
+        self.launched.append(self)
         with self._output.open("ab") as output:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "pneuarm", "run", str(self.config)],
@@ -158,7 +186,9 @@ class Daemon:
             return rows if ours else {}
 
         with self.client("pids") as client:
-            return wait_for(lambda: found(client), f"processes {names} in health")
+            pids = wait_for(lambda: found(client), f"processes {names} in health")
+        self._names |= {pid: name for name, pid in pids.items()}
+        return pids
 
     def health(self) -> pb.Health:
         """Return the newest `health`."""
@@ -169,15 +199,39 @@ class Daemon:
         """Send a signal to the supervisor alone."""
         os.kill(self.pid, number)
 
+    def send_signal_to(self, pid: int, number: int) -> None:
+        """Send a signal to one of the processes that :meth:`pids` has named: it is broken by it."""
+        self.breaks(self._names[pid])
+        os.kill(pid, number)
+
     def send_signal_to_all(self, number: int) -> None:
         """Send a signal to the whole group, as a terminal does."""
+        self.breaks("control", "device", "gateway")
         os.killpg(self.pid, number)
+
+    def breaks(self, *parts: str) -> None:
+        """Note that the test breaks something: a process, or the ``client`` that falls silent."""
+        for part in parts:
+            self._broken_ns.setdefault(part, time.time_ns())
+
+    def forget_what_was_broken(self) -> None:
+        """Begin another test."""
+        self._broken_ns.clear()
+
+    def lost_control(self, since_ns: int) -> bool:
+        """Say whether it has ended since a time (UTC) as one does whose control came too late."""
+        ended = self.process is not None and self.process.poll() == 3
+        late = ended and self._output.stat().st_mtime_ns >= since_ns
+        return late and not self.broke("control", time.time_ns())
+
+    def broke(self, part: str, time_ns: int) -> bool:
+        """Say whether the test had broken something before a time (UTC)."""
+        return self._broken_ns.get(part, time_ns) < time_ns
 
     def wait(self) -> int:
         """Wait for the end of the supervisor and of all its children; return its status."""
         assert self.process is not None
-        patience_s = 35.0  # the recorder alone may take 30 s to write what is left
-        wait_for(lambda: self.process and self.process.poll() is not None, self._what, patience_s)
+        wait_for(lambda: self.process and self.process.poll() is not None, self._what)
         wait_for(lambda: not self._running(), self._what)
         return self.process.returncode
 

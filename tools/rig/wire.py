@@ -11,7 +11,7 @@ from google.protobuf.message import Message
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import full_key
 from pneuarm.service.network.sessions import open_connected
-from tools.rig.daemon import Daemon, wait_for
+from tools.rig.daemon import PATIENCE_S, Daemon, wait_for
 
 JSON = "application/json"
 PROTOBUF = "application/protobuf"
@@ -77,7 +77,7 @@ class Wire:
     def ask(self, key: str, payload: bytes | None, encoding: str) -> zenoh.Sample:
         """Query a key and return the one answer."""
         replies = list(
-            self.session.get(self.key(key), payload=payload, encoding=encoding, timeout=3.0)
+            self.session.get(self.key(key), payload=payload, encoding=encoding, timeout=PATIENCE_S)
         )
         (reply,) = replies
         assert reply.ok is not None

@@ -7,8 +7,6 @@ Prints one JSON object. Lengths are metres, angles radians; ``worst`` is over al
 
 import argparse
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
@@ -268,40 +266,7 @@ it can take came to rest on the pose in {100 * found["trunk_inverse_met_share"]:
 trials, otherwise it says by its residual how far off it is
 ({found["trunk_inverse_worst_m"]:.1e} m at worst here).
 
-{speed()}"""
-
-
-def speed() -> str:
-    """Return the benchmark's figures as Markdown; the benchmark binds itself to one core."""
-    command = [sys.executable, "-m", "tools.bench.kinematics", "--json"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    found = json.loads(done.stdout)
-    if found["soromox_fk_jacobian_us"] is None:
-        return "Speed beside soromox: not measured, `make bench-setup` installs it."
-    rows = [
-        [
-            "forward kinematics with Jacobian, one call, us",
-            f"{found['fk_jacobian_us']:.2f}",
-            f"{found['soromox_fk_jacobian_us']:.1f}",
-            f"{found['fk_jacobian_times_faster']:.1f} (at least 15)",
-        ],
-        [
-            "full poses of a batch of a million, million/s",
-            f"{found['batch_fk_per_s'] / 1e6:.1f}",
-            f"{found['soromox_batch_fk_per_s'] / 1e6:.1f}",
-            f"{found['batch_fk_times_faster']:.1f} (at least 8)",
-        ],
-        [
-            "three sections against one, times slower",
-            f"{found['three_sections_times_slower']:.2f} (at most 4)",
-            "",
-            "",
-        ],
-    ]
-    table = markdown_table(["on one core, same run", "pneuarm", "soromox", "times"], rows)
-    return f"""Speed, `tools/bench/kinematics.py`, on {found["machine"]}:
-
-{table}"""
+How fast it is stands in [benchmarks.md](benchmarks.md)."""
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.kinematics.constant_curvature import lengths_from_shapes
 from pneuarm.controllers.kinematics.models.paper import SingularityFree
-from pneuarm.logs.view.pyplot import pyplot
+from pneuarm.service.pictures.pyplot import pyplot
 from tools.validation.models import (
     MOUNTINGS,
     all_models,

@@ -2,39 +2,24 @@
 
 from functools import cache
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
-from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.geometry.rotations import (
-    quaternion_from_rotation,
     rotation_from_quaternion,
-)
-from pneuarm.controllers.kinematics.constant_curvature import (
-    section_transforms,
-    shapes_from_lengths,
 )
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform as tip_of
 from pneuarm.controllers.laws.commanded_chambers import CommandedChambers
 from pneuarm.controllers.targets.targets import (
-    PARTS,
-    ROWS,
-    DirectionTarget,
     LengthsTarget,
-    PointTarget,
-    PoseTarget,
     PositionTarget,
-    PostureTarget,
-    Target,
     TasksTarget,
-    TwistTarget,
 )
-from pneuarm.controllers.tasks.rows import Rows, symbolic_rows
-from pneuarm.controllers.tasks.wanted import ORIENTATION_LENGTH_M, Wanted, symbols
+from tests.controllers.targets.asking import pose_of, rows_at, task_with_goal
 from tools.rig.arms import ARMS, random_lengths, trunk_arm
 
 STEP_M = 1e-6
@@ -46,61 +31,6 @@ AXES = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0, -0.8), (0.6, 0.64, 0.48)]
 
 every_arm = pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
 every_goal = pytest.mark.parametrize("kind", GOALS)
-
-
-@cache
-def compiled(arm: Arm) -> ca.Function:
-    lengths = ca.SX.sym("lengths", arm.n_chambers)
-    vector, want = symbols(arm.n_chambers, PARTS)
-    rows = symbolic_rows(arm, lengths, want, ROWS, whole=True)
-    return ca.Function("rows", [lengths, vector], ca.cse(list(rows)))
-
-
-def rows_at(arm: Arm, lengths: Array, task: Target, correction: Array | None = None) -> Rows:
-    """Rows of a task as numpy arrays; vectors are flat."""
-    wanted = Wanted(arm.n_chambers, PARTS)
-    task.ask(wanted, 30.0, 1.0)
-    if correction is not None:
-        wanted.correct(correction[:3, 3], correction[:3, :3])
-    results = [np.array(part) for part in compiled(arm)(lengths.reshape(-1), wanted.values)]
-    return Rows(*(part.reshape(-1) if part.shape[1] == 1 else part for part in results))
-
-
-def point_at(arm: Arm, lengths: Array, station: float) -> Array:
-    """Position of a backbone's point, the slow way."""
-    transform = np.eye(4)
-    shapes = shapes_from_lengths(lengths, arm.per_section("chamber_offset_m"))
-    for index, shape in enumerate(shapes):
-        share = np.clip(station * arm.n_sections - index, 0.0, 1.0)
-        transform = transform @ section_transforms(share * shape)
-    return transform[:3, 3]
-
-
-def pose_of(position_m: Array, rotation: Array) -> PoseTarget:
-    return PoseTarget(position_m, quaternion_from_rotation(rotation))
-
-
-def task_with_goal(kind: str, arm: Arm, goal: Array) -> Target:
-    tip = tip_of(arm, goal)
-    point = PointTarget(point_at(arm, goal, 0.6), 0.6, weight=2.0)
-    match kind:
-        case "position":
-            return PositionTarget(tip[:3, 3])
-        case "pose":
-            return PoseTarget(
-                tip[:3, 3],
-                quaternion_from_rotation(tip[:3, :3]),
-                weight=2.0,
-                orientation_weight=0.5,
-            )
-        case "direction":
-            return DirectionTarget(tip[:3, 2], weight=3.0)
-        case "point":
-            return point
-        case "combined":
-            direction = DirectionTarget(tip[:3, 2], weight=0.3)
-            return TasksTarget((PositionTarget(tip[:3, 3]), direction, point))
-    return LengthsTarget(goal)
 
 
 @every_arm
@@ -152,58 +82,6 @@ def test_following_a_task_comes_closer(kind: str, arm: Arm, seed: int) -> None:
 motion_of = cache(CommandedChambers)
 
 
-def test_the_error_of_a_position_is_the_distance() -> None:
-    arm = trunk_arm()
-    tip = tip_of(arm, arm.rest_lengths_m)[:3, 3]
-    task = PositionTarget(tip + np.array([0.03, 0.0, -0.04]), weight=7.0)
-    assert rows_at(arm, arm.rest_lengths_m, task).error_m == pytest.approx(0.05)
-
-
-@pytest.mark.parametrize("angle", [1e-12, 1e-6, 0.4, 3.0, np.pi - 1e-9, np.pi])
-@pytest.mark.parametrize(
-    "axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0, -0.8), (0.6, 0.64, 0.48)]
-)
-def test_the_error_of_a_pose_is_the_angle_times_its_length(
-    angle: float, axis: tuple[float, ...]
-) -> None:
-    arm, vector = trunk_arm(), np.array(axis)
-    tip = tip_of(arm, arm.rest_lengths_m)
-    quaternion = np.append(np.sin(0.5 * angle) * vector, np.cos(0.5 * angle))
-    task = pose_of(tip[:3, 3], rotation_from_quaternion(quaternion) @ tip[:3, :3])
-    rows = rows_at(arm, arm.rest_lengths_m, task)
-    turn = rows.error[3:6] / ORIENTATION_LENGTH_M
-    assert rows.error_m == pytest.approx(ORIENTATION_LENGTH_M * angle, abs=1e-9)
-    sign = np.sign(turn @ vector) if angle > 3.1 else 1.0  # half a turn goes either way
-    np.testing.assert_allclose(sign * turn, angle * vector, atol=2e-7)
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.7, 3.0, np.pi])
-def test_the_error_of_a_direction_is_the_angle_and_roll_is_free(angle: float) -> None:
-    arm = trunk_arm()
-    direction = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    rows = rows_at(arm, arm.rest_lengths_m, DirectionTarget(direction))
-    assert rows.error_m == pytest.approx(ORIENTATION_LENGTH_M * angle, abs=1e-9)
-    np.testing.assert_allclose(rows.jacobian[5], 0.0, atol=1e-15)  # about its own axis
-
-
-def test_the_error_of_lengths_is_the_worst_chamber() -> None:
-    arm = trunk_arm()
-    goal = arm.rest_lengths_m.copy()
-    goal[1, 2] += 0.007
-    goal[2, 0] -= 0.004
-    rows = rows_at(arm, arm.rest_lengths_m, LengthsTarget(goal))
-    assert rows.error_m == pytest.approx(0.007)
-
-
-@every_arm
-@given(seed=SEEDS, station=st.floats(0.0, 1.0))
-def test_a_point_of_the_backbone_is_where_it_is(arm: Arm, seed: int, station: float) -> None:
-    lengths = random_lengths(arm, np.random.default_rng(seed))
-    wanted = np.array([0.01, -0.02, 0.03])
-    rows = rows_at(arm, lengths, PointTarget(wanted, station))
-    np.testing.assert_allclose(rows.error[6:], wanted - point_at(arm, lengths, station), atol=1e-13)
-
-
 @every_arm
 @given(seed=SEEDS)
 def test_a_correction_moves_and_turns_the_tip_that_is_seen(arm: Arm, seed: int) -> None:
@@ -219,26 +97,6 @@ def test_a_correction_moves_and_turns_the_tip_that_is_seen(arm: Arm, seed: int) 
     plain = rows_at(arm, lengths, task).jacobian
     np.testing.assert_allclose(rows.jacobian[:3], plain[:3], atol=1e-12)
     np.testing.assert_allclose(rows.jacobian[3:6], correction[:3, :3] @ plain[3:6], atol=1e-12)
-
-
-@pytest.mark.parametrize("about_base_origin", [False, True])
-@pytest.mark.parametrize("in_tip_frame", [False, True])
-def test_a_twist_is_the_motion_of_the_body_point_at_the_reference(
-    in_tip_frame: bool, about_base_origin: bool
-) -> None:
-    arm = trunk_arm()
-    lengths = random_lengths(arm, np.random.default_rng(5))
-    tip = tip_of(arm, lengths)
-    rows = rows_at(arm, lengths, TwistTarget(LINEAR, ANGULAR, in_tip_frame, about_base_origin))
-    frame = tip[:3, :3] if in_tip_frame else np.eye(3)
-    spin = rows.velocity[3:6] / ORIENTATION_LENGTH_M
-    np.testing.assert_allclose(spin, frame @ ANGULAR)
-    reference = np.zeros(3) if about_base_origin else tip[:3, 3]
-    # Rigid body: the point at the reference moves with v_tip + omega x (reference - tip).
-    point = rows.velocity[:3] + np.cross(spin, reference - tip[:3, 3])
-    np.testing.assert_allclose(point, frame @ LINEAR, atol=1e-15)
-    np.testing.assert_array_equal(rows.error, 0.0)
-    assert rows.error_m == 0.0
 
 
 def test_a_position_that_moves_is_followed_without_lag() -> None:
@@ -287,18 +145,3 @@ def test_weights_decide_the_compromise_between_tasks() -> None:
             motion.step(motion.qp_ik, 5e-3)
         distances.append(float(np.linalg.norm(first - motion.tip.position_m)))
     assert distances[0] > 1.5 * distances[1] > 4.0 * distances[2]
-
-
-def test_posture_alone_asks_for_nothing_else() -> None:
-    wanted = Wanted(9, PARTS)
-    PostureTarget(weight=0.5).ask(wanted, 30.0, 0.3)
-    assert wanted["posture_weight"] == 0.5
-    assert not wanted["position_weight"].any()
-
-
-@given(seed=SEEDS)
-def test_a_quaternion_and_its_rotation_are_the_same(seed: int) -> None:
-    quaternion = np.random.default_rng(seed).standard_normal(4)
-    quaternion /= np.copysign(np.linalg.norm(quaternion), quaternion[3])
-    found = quaternion_from_rotation(rotation_from_quaternion(quaternion))
-    np.testing.assert_allclose(found, quaternion, atol=1e-12)

@@ -1,7 +1,6 @@
 """The client for a user's own program, against a real daemon."""
 
 import math
-import os
 import signal
 import time
 from collections.abc import Iterator
@@ -186,12 +185,12 @@ def test_a_reset_stays_whatever_stop_came_before_it(client: Client) -> None:
 
 def test_stop_that_nothing_shows_is_not_confirmed(client: Client, daemon: Daemon) -> None:
     gateway = daemon.pids("gateway")["gateway"]
-    os.kill(gateway, signal.SIGSTOP)
+    daemon.send_signal_to(gateway, signal.SIGSTOP)
     try:
         with pytest.raises(NotConfirmed, match=r"NOT CONFIRMED: .* cut the air supply"):
             client.estop()
     finally:
-        os.kill(gateway, signal.SIGCONT)
+        daemon.send_signal_to(gateway, signal.SIGCONT)
     wait_for(lambda: client.state().mode == pb.ESTOP, "the belated stop")
     client.reset()
 

@@ -119,6 +119,7 @@ def test_taking_over_makes_the_arm_hold_and_shuts_the_first_out(
 def test_arm_holds_when_its_client_is_killed(
     daemon: Daemon, watcher: Client, sender: "subprocess.Popen[bytes]"
 ) -> None:
+    daemon.breaks("client")
     sender.kill()
     assert held(watcher).code in ("lease_lost", "target_stale")
     watcher.enable()  # its lease went with it
@@ -126,8 +127,9 @@ def test_arm_holds_when_its_client_is_killed(
 
 
 def test_arm_holds_when_its_client_hangs(
-    watcher: Client, sender: "subprocess.Popen[bytes]"
+    daemon: Daemon, watcher: Client, sender: "subprocess.Popen[bytes]"
 ) -> None:
+    daemon.breaks("client")
     sender.send_signal(signal.SIGSTOP)
     event = held(watcher)
     assert event.code == "target_stale"
@@ -142,8 +144,9 @@ def test_arm_holds_when_its_client_hangs(
 
 
 def test_lease_of_a_silent_client_runs_out(
-    watcher: Client, sender: "subprocess.Popen[bytes]"
+    daemon: Daemon, watcher: Client, sender: "subprocess.Popen[bytes]"
 ) -> None:
+    daemon.breaks("client")
     sender.send_signal(signal.SIGSTOP)
     with pytest.raises(LeaseRefused, match=r"sender@.* holds the arm"):
         watcher.take_lease()
@@ -156,4 +159,5 @@ def test_arm_without_targets_of_its_operator_goes_stale(daemon: Daemon, watcher:
     with daemon.client("quiet") as quiet:
         arm(quiet)
         keep_moving(quiet, enough(0.2), "some movement")
+        daemon.breaks("client")
         assert held(watcher).code == "target_stale"

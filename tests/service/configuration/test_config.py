@@ -58,6 +58,13 @@ def test_every_preset_loads_and_builds_an_arm(preset: str) -> None:
 
 
 @pytest.mark.parametrize("preset", PRESETS)
+def test_the_chambers_of_a_preset_end_where_equation_4_says(preset: str) -> None:
+    for section in load(preset=preset).build_arm().sections:
+        assert section.length_min_m == pytest.approx(0.5 * section.rest_length_m, rel=1e-12)
+        assert section.length_max_m == pytest.approx(1.5 * section.rest_length_m, rel=1e-12)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
 def test_what_is_shown_loads_to_the_same(tmp_path: Path, preset: str) -> None:
     configuration = load(preset=preset)
     assert loaded(tmp_path, configuration.to_toml()) == configuration

@@ -50,7 +50,7 @@ def test_a_viewer_whose_server_stands_still_does_not_outlive_its_supervisor(tmp_
     try:
         daemon.start()
         server = daemon.pids("viewer", "rerun")["rerun"]
-        os.kill(server, signal.SIGSTOP)
+        daemon.send_signal_to(server, signal.SIGSTOP)
         daemon.send_signal(signal.SIGKILL)
         daemon.wait()
         wait_for(lambda: not Path(f"/proc/{server}").exists(), "the end of Rerun's server")

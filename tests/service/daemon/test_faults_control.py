@@ -1,6 +1,5 @@
 """Control or the supervisor dies or stands still: the air goes, the log is closed, and says why."""
 
-import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,7 +34,7 @@ def bend(daemon: Daemon) -> None:
 def test_without_control_the_supervisor_vents_and_ends(daemon: Daemon, number: int) -> None:
     control = daemon.pids("control")["control"]
     bend(daemon)
-    os.kill(control, number)
+    daemon.send_signal_to(control, number)
     assert daemon.wait() == 3
     lost = [event for event in daemon.events() if event.code == "control_lost"]
     assert len(lost) == 1

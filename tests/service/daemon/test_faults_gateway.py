@@ -1,7 +1,6 @@
 """The gateway dies or stands still, the supervisor stands still: the arm can still be stopped."""
 
 import json
-import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +30,7 @@ def test_gateway_killed_arm_holds_and_the_client_goes_on(daemon: Daemon) -> None
         client.enable()
         keep_moving(client, enough(0.5), "some movement")
         before = client.state().sequence
-        os.kill(gateway, signal.SIGKILL)
+        daemon.send_signal_to(gateway, signal.SIGKILL)
         wait_for(lambda: "gateway_restarted" in daemon.codes(), "the gateway started again")
         arm(client)
         state = client.move_to((0.0, 0.0, 0.21))
@@ -51,11 +50,11 @@ def test_gateway_stopped_arm_holds_then_vents(daemon: Daemon) -> None:
         arm(client)
         keep_moving(client, enough(0.5), "some movement")
         known = len(daemon.codes())
-        os.kill(gateway, signal.SIGSTOP)
+        daemon.send_signal_to(gateway, signal.SIGSTOP)
         try:
             wait_for(lambda: "gateway_lost" in daemon.codes()[known:], "the arm to vent")
         finally:
-            os.kill(gateway, signal.SIGCONT)
+            daemon.send_signal_to(gateway, signal.SIGCONT)
         arm(client)
     new = daemon.codes()[known:]
     assert new[:2] == ["gateway_silent", "gateway_lost"]
@@ -66,11 +65,11 @@ def test_local_stop_works_while_the_gateway_stands_still(daemon: Daemon) -> None
     gateway = daemon.pids("gateway")["gateway"]
     with daemon.client() as client:
         arm(client)
-        os.kill(gateway, signal.SIGSTOP)
+        daemon.send_signal_to(gateway, signal.SIGSTOP)
         try:
             done = daemon.command("estop", "--json")
         finally:
-            os.kill(gateway, signal.SIGCONT)
+            daemon.send_signal_to(gateway, signal.SIGCONT)
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout) == {"stopped": True, "confirmed": "on this machine"}
         wait_for(lambda: client.state().mode == pb.ESTOP, "the stop in the state")
@@ -98,11 +97,11 @@ def test_nothing_can_stop_is_said_clearly(daemon: Daemon) -> None:
     gateway = daemon.pids("gateway")["gateway"]
     before = daemon.output().count("emergency stop")
     daemon.send_signal(signal.SIGSTOP)
-    os.kill(gateway, signal.SIGSTOP)
+    daemon.send_signal_to(gateway, signal.SIGSTOP)
     try:
         done = daemon.command("estop")
     finally:
-        os.kill(gateway, signal.SIGCONT)
+        daemon.send_signal_to(gateway, signal.SIGCONT)
         daemon.send_signal(signal.SIGCONT)
     assert done.returncode == 1
     assert "NOT CONFIRMED" in done.stderr
@@ -114,7 +113,7 @@ def test_nothing_can_stop_is_said_clearly(daemon: Daemon) -> None:
 
 def test_daemon_ends_well_although_the_gateway_stands_still(tmp_path: Path) -> None:
     with Daemon(tmp_path) as daemon:
-        os.kill(daemon.pids("gateway")["gateway"], signal.SIGSTOP)
+        daemon.send_signal_to(daemon.pids("gateway")["gateway"], signal.SIGSTOP)
         daemon.stop()
         assert "the gateway process did not end by itself and was killed" in daemon.output()
         summary = summarise(daemon.log())

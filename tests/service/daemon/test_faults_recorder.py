@@ -49,13 +49,13 @@ def lost(client: Client) -> int:
 
 def test_recorder_stopped_for_a_while_loses_nothing(daemon: Daemon, client: Client) -> None:
     recorder = daemon.pids("recorder")["recorder"]
-    os.kill(recorder, signal.SIGSTOP)
+    daemon.send_signal_to(recorder, signal.SIGSTOP)
     try:
         keep_moving(client, enough(3.0), "three seconds of movement without a recorder")
         stopped_at = summarise(daemon.log()).ticks
         assert client.state().sequence - stopped_at > 2000
     finally:
-        os.kill(recorder, signal.SIGCONT)
+        daemon.send_signal_to(recorder, signal.SIGCONT)
     keep_moving(client, lambda: summarise(daemon.log()).ticks > stopped_at + 2000, "catching up")
     summary = caught_up(daemon, client)
     assert summary.missing_ticks == 0
@@ -67,7 +67,7 @@ def test_recorder_killed_is_revived_and_nothing_is_missing(daemon: Daemon, clien
     for _ in range(2):
         recorder = daemon.pids("recorder")["recorder"]
         keep_moving(client, enough(0.5), "some movement")
-        os.kill(recorder, signal.SIGKILL)
+        daemon.send_signal_to(recorder, signal.SIGKILL)
         keep_moving(
             client,
             lambda before=recorder: daemon.pids("recorder")["recorder"] != before,
@@ -135,9 +135,13 @@ def test_low_disk_refuses_to_enable_and_says_why(tmp_path: Path) -> None:
         with pytest.raises(ModeRefused, match=r"too little free space .* log\.min_free_mib"):
             client.enable()
         assert client.state().mode == pb.READY
-        refusal = wait_for(client.events, "the event")[0]
-        assert refusal.code == "mode_refused"
-        assert "free space" in refusal.text
+        found: list[pb.Event] = []
+
+        def told() -> list[pb.Event]:
+            found.extend(event for event in client.events() if event.code == "mode_refused")
+            return found
+
+        assert "free space" in wait_for(told, "the event that it is refused")[0].text
 
 
 class FullDisk:

@@ -125,7 +125,7 @@ def test_the_watchdog_is_fed_by_ticks_alone(tmp_path: Path, heard: Manager) -> N
     with Daemon(tmp_path) as daemon:
         until(heard, "WATCHDOG=1", 5)
         control = daemon.pids("control")["control"]
-        os.kill(control, signal.SIGSTOP)
+        daemon.send_signal_to(control, signal.SIGSTOP)
         stopped = Path(f"/proc/{control}/stat")
         wait_for(lambda: stopped.read_text().rpartition(")")[2].split()[0] == "T", "the stop")
         heard.read()

@@ -26,7 +26,7 @@ from pneuarm.service.processes.device_slots import (
     LinkedDevice,
     LinkState,
 )
-from tests.hardware.festo_bench import WATCHDOG
+from tests.hardware.festo.festo_bench import WATCHDOG
 
 SOME_PA = np.array([[2e4, -1e4, 1e4]])
 ZEROS = np.zeros((1, 3))

@@ -1,6 +1,5 @@
 """A whole daemon on an emulated terminal: whatever dies or stalls, the terminal loses its air."""
 
-import os
 import signal
 import time
 from collections.abc import Iterator
@@ -75,15 +74,16 @@ def test_faults_of_transport_and_process_latch_and_are_left_by_reset(
     daemon: Daemon, emulator: Emulator
 ) -> None:
     move(daemon, emulator)
+    daemon.breaks("device")
     emulator.say("unplug 1")
     fault_and_reset(daemon, emulator, "festo_cpx")
     move(daemon, emulator)
-    os.kill(daemon.pids("device")["device"], signal.SIGKILL)
+    daemon.send_signal_to(daemon.pids("device")["device"], signal.SIGKILL)
     fault_and_reset(daemon, emulator, "device")
     move(daemon, emulator, 0.2)
     control = daemon.pids("control")["control"]
     killed_s = time.monotonic()
-    os.kill(control, signal.SIGKILL)
+    daemon.send_signal_to(control, signal.SIGKILL)
     assert daemon.wait() == 3
     zero_s = emulator.zero_since()
     assert zero_s is not None

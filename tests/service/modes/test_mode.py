@@ -3,6 +3,7 @@
 import pytest
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.modes import mode
 from pneuarm.service.modes.mode import VENTED_MODES, Mode, ModeEvent, next_mode, why_not
 
 #: For each event, the mode after idle, ready, active, hold, fault and estop; "-" where refused.
@@ -96,3 +97,11 @@ def test_a_refusal_says_what_to_do(mode: Mode, event: ModeEvent, words: str) -> 
 def test_modes_are_numbered_as_on_the_wire() -> None:
     wire = {name: number for name, number in pb.Mode.items() if number}
     assert wire == {mode.name: mode.value for mode in Mode}
+
+
+@pytest.mark.parametrize(("arrow", "after"), [("(a)", Mode.HOLD), ("(b)", Mode.IDLE)])
+def test_the_drawing_names_every_event_of_an_arrow_out_of_active(arrow: str, after: Mode) -> None:
+    lines = (mode.__doc__ or "").splitlines()
+    (named,) = (line.strip() for line in lines if line.strip().startswith(arrow))
+    drawn = {ModeEvent[name.strip()] for name in named.removeprefix(arrow).split(",")}
+    assert drawn == {event for event in ModeEvent if next_mode(Mode.ACTIVE, event) == after}

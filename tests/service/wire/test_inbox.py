@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from pneuarm.controllers.limits.length import LengthLimit
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from tools.rig.daemon import Daemon, wait_for
 
@@ -20,6 +21,7 @@ def test_out_of_reach_is_said_once_with_the_limit_and_the_nearest_point(tmp_path
         for _ in range(20):
             told()
         assert len(found) == 1
-        assert "length binds; the nearest reachable point is (" in event.text
+        assert LengthLimit.words in event.text
+        assert "(186.5, 0.0, 100.1) mm" in event.text
         client.send_position((0.0, 0.0, 0.2))
         assert wait_for(lambda: told()[1:], "a second one after a target within reach")

@@ -11,8 +11,8 @@ def pyplot() -> Any:
         import matplotlib
     except ModuleNotFoundError as error:
         raise NotInstalled(
-            "pictures are drawn with Matplotlib, which is not installed: "
-            "pip install 'pneuarm[pictures]'"
+            "pictures are drawn with Matplotlib, which is not installed; in the checkout of "
+            "pneuarm: pip install ./distributions/client '.[pictures]'"
         ) from error
     matplotlib.use("Agg")
     from matplotlib import pyplot

@@ -12,16 +12,11 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.counts import counts_of, pressures_of
 from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
 from pneuarm.hardware.festo_cpx.adapter import FestoCpx
 from pneuarm.hardware.festo_cpx.emulator import EmulatedCpx
-from pneuarm.hardware.festo_cpx.protocol import (
-    CpxInputs,
-    CpxLayout,
-    complaint,
-    counts_of,
-    pressures_of,
-)
+from pneuarm.hardware.festo_cpx.protocol import CpxInputs, CpxLayout, complaint
 from pneuarm.hardware.festo_vtem.adapter import FestoVtem
 from pneuarm.hardware.festo_vtem.emulator import EmulatedVtem
 from pneuarm.hardware.festo_vtem.protocol import (
@@ -41,7 +36,7 @@ from pneuarm.hardware.transports.modbus import (
 )
 from pneuarm.hardware.transports.modbus_server import ServedTerminal
 from tests.hardware.arms import ARMS
-from tests.hardware.festo_bench import WATCHDOG, cpx_settings, vtem_settings
+from tests.hardware.festo.festo_bench import WATCHDOG, cpx_settings, vtem_settings
 
 PAPER = ARMS["paper"]
 LAYOUT = CpxLayout((0, 1, 2))

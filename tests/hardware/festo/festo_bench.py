@@ -6,10 +6,11 @@ from contextlib import contextmanager
 
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.hardware.emulation.emulation import EmulatedArm
+from pneuarm.hardware.festo.counts import COUNT_PA
 from pneuarm.hardware.festo.terminal_watchdog import TerminalWatchdog
 from pneuarm.hardware.festo_cpx.adapter import CpxSettings, FestoCpx
 from pneuarm.hardware.festo_cpx.emulator import EmulatedCpx
-from pneuarm.hardware.festo_cpx.protocol import COUNT_PA, CpxLayout
+from pneuarm.hardware.festo_cpx.protocol import CpxLayout
 from pneuarm.hardware.festo_vtem.adapter import FestoVtem, VtemSettings
 from pneuarm.hardware.festo_vtem.emulator import EmulatedVtem
 from pneuarm.hardware.festo_vtem.protocol import VtemLayout
