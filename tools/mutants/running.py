@@ -123,6 +123,8 @@ def _in_child(name: str, text: str, tests: Sequence[str], limits: Limits) -> Non
         sys.meta_path.insert(0, _Finder(name, text))
         pytest = importlib.import_module("pytest")
         options = ["-x", "-q", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
+        # Hypothesis was loaded before pytest could look at it, which its settings call an error.
+        options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
         status = int(pytest.main([*options, "-m", "not slow", *tests]))
     finally:
         os._exit(status)
