@@ -6,6 +6,8 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from pneuarm.hardware.tables.table import LARGEST, SMALLEST
+
 #: What a number without bounds may be.
 _ANY = "finite number"
 
@@ -65,8 +67,10 @@ def _text(bounds: list[Any]) -> str:
 def _range(bounds: list[Any]) -> str:
     low, high = "", ""
     for bound in bounds:
+        if bound in (Ge(-LARGEST), Le(LARGEST)):
+            continue  # a number at all, which the page says once
         if isinstance(bound, Ge):
-            low = f"{bound.ge:.10g}"
+            low = "above 0" if bound.ge == SMALLEST else f"{bound.ge:.10g}"
         elif isinstance(bound, Gt):
             low = f"above {bound.gt:.10g}"
         elif isinstance(bound, Le):
