@@ -73,7 +73,7 @@ def flood(daemon: Daemon, kind: str) -> Iterator[None]:
         yield
     finally:
         process.kill()
-        process.wait(10)
+        process.communicate()
 
 
 @pytest.mark.parametrize("kind", KINDS)
