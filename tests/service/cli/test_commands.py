@@ -11,7 +11,7 @@ import pytest
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.client import Client
-from tools.rig.daemon import ROOT, Daemon, assert_one_sentence, wait_for
+from tools.rig.daemon import PATIENCE_S, ROOT, Daemon, assert_one_sentence, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_state_follow_goes_on_until_ctrl_c(
         assert process.stdout is not None
         lines = [process.stdout.readline() for _ in range(5)]
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=PATIENCE_S)
     finally:
         process.kill()
     assert process.returncode == 130

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from tools.rig.daemon import ROOT
+from tools.rig.daemon import PATIENCE_S, ROOT
 
 #: Sends the signal to itself just when a module is being looked for.
 _PROGRAM = """
@@ -31,7 +31,11 @@ def interrupted(
     """Run a command with Ctrl-C at the import of a module."""
     program = _PROGRAM.format(module=module, arguments=arguments, start=start)
     return subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=30
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
     )
 
 

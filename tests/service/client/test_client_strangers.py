@@ -17,7 +17,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode, encoding_of
 from pneuarm.logs.schema.topics import ESTOP, EVENT, INFO, MODE, STATE, full_key
 from pneuarm.service.network.sessions import open_connected, open_listening
-from tools.rig.daemon import ROOT, Daemon, free_port, wait_for
+from tools.rig.daemon import PATIENCE_S, ROOT, Daemon, free_port, wait_for
 
 #: A field that no message of ours has.
 NEWER = b"\xfa\x3f\x03new"
@@ -238,7 +238,7 @@ def test_a_forked_process_is_told_instead_of_hanging(daemon: Daemon, opened_by: 
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=PATIENCE_S,
     )
     lines = done.stdout.splitlines()
     refused = [line for line in lines if "refused:" in line]
