@@ -5,7 +5,9 @@ loops on two cores would make each other late. Everything else goes on beside th
 machine makes such a daemon late all the same, the test is done again: tools.rig.interruptions.
 """
 
+import os
 import subprocess
+from collections.abc import Iterator
 from types import ModuleType
 
 import pytest
@@ -18,6 +20,14 @@ _REAL = ("tools.rig.daemon", "tools.rig.wire", "tools.rig.emulators", "tools.fau
 def pytest_configure(config: pytest.Config) -> None:
     """Let tests be done again in which the machine made an arm hold."""
     config.pluginmanager.register(DoneAgain())
+
+
+@pytest.fixture(autouse=True)
+def ordinary_priority() -> Iterator[None]:
+    """Give back the real-time priority that a command took in the process of the test."""
+    yield
+    if os.sched_getscheduler(0) != os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
