@@ -30,6 +30,8 @@ def enter(name: str, module: str, arguments: tuple[object, ...]) -> None:
     try:
         main: Callable[..., None] = importlib.import_module(module).main
         main(*arguments)
+    except SystemExit as ending:  # whoever raises it has told why
+        os._exit(ending.code if isinstance(ending.code, int) else 1)
     except BaseException as error:
         _print(f"ERROR      {name}: {sentence(error)}", sys.stderr)
         os._exit(1)  # a library's threads might keep the process from ending

@@ -156,7 +156,7 @@ def test_state_follow_goes_on_until_ctrl_c(
 
 REFUSED = {
     "millimetres": (("position", "20000", "0", "210"), "is it in mm?"),
-    "not a number": (("position", "nan", "0", "210"), "must be finite"),
+    "not a number": (("position", "nan", "0", "210"), "finite"),
     "too few chambers": (("lengths", "200", "200"), "2 values; arm"),
     "too long": (("lengths", "200", "200", "400"), "chamber 3 is 0.4 m"),
     "too much": (("pressures", "0", "0", "9"), "allowed: -90000 to 90000 Pa"),

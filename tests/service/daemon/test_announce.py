@@ -56,7 +56,7 @@ def test_every_fact_is_one_line() -> None:
     ]
 
 
-@pytest.mark.parametrize("open_endpoint", ["tcp/0.0.0.0:7447", "tcp/[::]:1", "udp/10.0.0.5:7447"])
+@pytest.mark.parametrize("open_endpoint", ["tcp/0.0.0.0:7448", "tcp/[::]:1", "udp/10.0.0.5:7447"])
 def test_listening_to_others_is_a_warning(open_endpoint: str) -> None:
     lines = facts(zenoh={"listen": ["tcp/127.0.0.1:7447", open_endpoint]})
     (warning,) = warnings(lines)
