@@ -131,7 +131,7 @@ def enabled(client: Client) -> bool:
 
 
 def test_low_disk_refuses_to_enable_and_says_why(tmp_path: Path) -> None:
-    with Daemon(tmp_path, {"log": {"min_free_mib": 1e12}}) as daemon, daemon.client() as client:
+    with Daemon(tmp_path, {"log": {"min_free_mib": 1e9}}) as daemon, daemon.client() as client:
         with pytest.raises(ModeRefused, match=r"too little free space .* log\.min_free_mib"):
             client.enable()
         assert client.state().mode == pb.READY
