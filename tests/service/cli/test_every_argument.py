@@ -148,6 +148,10 @@ def test_where_the_daemon_is_may_be_mistyped(
     words = [command, f"{option}={value}"]
     if option != "--connect":
         words.append("--connect=tcp/127.0.0.1:1")
+    if option != "--arm":
+        words.append(
+            f"--arm=nobody{os.getpid()}"
+        )  # an arm that runs on this machine would be stopped
     assert main(words) == 1
     told = capsys.readouterr()
     assert_one_line(told, words)

@@ -50,7 +50,7 @@ def test_loss_and_return_on_a_circle_are_told_and_jump_no_command(rig: CameraRig
         changes = np.diff(ticks["tip_commanded_position_m"], axis=0)
         return float(np.linalg.norm(changes, axis=1).max())
 
-    rig.circle(CIRCLE, 2.0)
+    rig.circle(CIRCLE, 10.0)  # whatever was told before may be told again at once
     rig.events.clear()
     undisturbed = largest(rig.circle(CIRCLE, 2.0))
     rig.camera = False

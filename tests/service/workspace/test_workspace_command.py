@@ -113,10 +113,10 @@ def test_a_folder_that_cannot_be_made_is_one_sentence(
 
 
 def test_a_senseless_number_of_samples_is_one_sentence(capsys: pytest.CaptureFixture) -> None:
-    assert main(["workspace", "--samples", "-3"]) == 1
+    assert main(["workspace", "--samples", "-3"]) == 2
     said = capsys.readouterr().err
-    assert "samples = -3" in said
-    assert "10" in said
+    assert "--samples" in said
+    assert "-3" in said
 
 
 @pytest.mark.parametrize("preset", ["paper", "table1", "trunk"])
