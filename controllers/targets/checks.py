@@ -51,7 +51,7 @@ class Allowed:
 
     def check_near(self, position_m: Array) -> None:
         """Refuse what is no position in metres."""
-        distance = float(np.linalg.norm(position_m))
+        distance = math.hypot(*position_m)
         if distance > FARTHEST_ARM_LENGTHS * self.arm.max_length_m:
             raise TargetRejected(
                 f"position_m = {listed(position_m)} is {distance:.3g} m from the base, more than "
@@ -107,7 +107,7 @@ def vector(fields: Fields, name: str) -> Array:
 def rate(fields: Fields, name: str, largest: float, unit: str, mistaken: str) -> Array:
     """Vector (3,) no longer than what any soft arm does; else it is in a mistaken unit."""
     values = vector(fields, name)
-    if np.linalg.norm(values) > largest:
+    if math.hypot(*values) > largest:
         raise TargetRejected(
             f"{name} = {listed(values)} is above {largest:g} {unit}; is it in {mistaken}?"
         )
@@ -117,7 +117,7 @@ def rate(fields: Fields, name: str, largest: float, unit: str, mistaken: str) ->
 def unit_vector(fields: Fields, name: str) -> Array:
     """Unit vector (3,) along a vector of some length."""
     values = vector(fields, name)
-    norm = float(np.linalg.norm(values))
+    norm = math.hypot(*values)
     if not 1e-6 < norm < 1e6:
         raise TargetRejected(f"{name} = {listed(values)} points nowhere; give a unit vector")
     return values / norm
@@ -128,7 +128,7 @@ def quaternion(fields: Fields, name: str) -> Array:
     value = required(fields, name)
     values = np.array([value[axis] for axis in "xyzw"], dtype=np.float64)
     _check_finite(name, values)
-    norm = float(np.linalg.norm(values))
+    norm = math.hypot(*values)
     if abs(norm - 1.0) > _UNIT_TOLERANCE:
         raise TargetRejected(
             f"{name} = {listed(values)} has the norm {norm:.4g}; a unit quaternion "

@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 
-from pneuarm.controllers.arm.errors import TargetRejected
 from pneuarm.controllers.geometry.moving_point import MovingPoint
 from pneuarm.controllers.targets import checks
 from pneuarm.controllers.targets.shape import ShapeTarget, perpendicular, triple
@@ -37,9 +36,7 @@ class CircleTarget(ShapeTarget):
         center = allowed.position(fields, "center_m")
         normal = np.array([0.0, 0.0, 1.0])
         if fields["normal"] is not None:
-            normal = checks.vector(fields, "normal")
-        if np.linalg.norm(normal) < 1e-9:
-            raise TargetRejected(f"normal = {normal.tolist()}: a vector of some length is needed")
+            normal = checks.unit_vector(fields, "normal")
         first, second = perpendicular(normal)
         return cls(
             triple(center),

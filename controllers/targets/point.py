@@ -1,5 +1,6 @@
 """A point of the backbone at a position."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -43,7 +44,7 @@ class PointTarget(Target):
         position, arm = allowed.position(fields), allowed.arm
         shares = np.clip(station * arm.n_sections - np.arange(arm.n_sections), 0.0, 1.0)
         longest = float(shares @ arm.per_section("length_max_m")[:, 0])
-        distance = float(np.linalg.norm(position))
+        distance = math.hypot(*position)
         if distance > longest:
             raise TargetRejected(
                 f"position_m = {checks.listed(position)} is {distance:.3g} m from the base, but "

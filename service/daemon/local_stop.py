@@ -7,6 +7,7 @@ here that a stop could fail at.
 
 import contextlib
 import socket
+import struct
 import time
 from collections.abc import Sequence
 
@@ -101,7 +102,10 @@ def stop_locally(arm_name: str) -> None:
     Raises DaemonUnreachable if there is none here, NotConfirmed if it did not say that it acted.
     """
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        connection.settimeout(_CONFIRM_S)
+        # Not `settimeout`: where the queue of callers is full, that gives up without waiting.
+        patience = struct.pack("ll", int(_CONFIRM_S), int(1e6 * (_CONFIRM_S % 1.0)))
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, patience)
         try:
             connection.connect(_address(arm_name))
             connection.sendall(b"estop\n")

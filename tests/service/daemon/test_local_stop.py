@@ -93,7 +93,9 @@ def test_a_stuck_supervisor_with_a_full_queue_neither() -> None:
         other.close()
 
 
-def test_connections_that_say_nothing_delay_no_stop() -> None:
+def test_connections_that_say_nothing_delay_no_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A tenth of a second for each of them would be half a minute.
+    monkeypatch.setattr(local_stop, "_CONFIRM_S", 10.0)
     with listen(NAME) as listener, contextlib.ExitStack() as silent:
         callers = Callers(listener)
         stopped = threading.Event()
@@ -111,7 +113,7 @@ def test_connections_that_say_nothing_delay_no_stop() -> None:
             other = silent.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
             other.connect(f"\0pneuarm/arm/{NAME}")
         try:
-            stop_locally(NAME)  # within the patience of the fixture above
+            stop_locally(NAME)
         finally:
             stopped.set()
             server.join(20)
