@@ -43,7 +43,8 @@ def _turned(pose: PoseInFrame, since_s: float) -> PoseInFrame:
 
 #: What becomes of a pose so long (s) after the lie began; a frozen one is kept by the program.
 LIES: dict[str, Lie] = {
-    "jump": lambda pose, since_s: _shifted(pose, 0.3 * (int(since_s / 0.7) % 2)),
+    "jump": lambda pose, since_s: _shifted(pose, 0.1 * (int(since_s / 0.7) % 2)),
+    "far": lambda pose, since_s: _shifted(pose, 0.3),
     "drift": lambda pose, since_s: _shifted(pose, 0.02 * since_s),
     "flip": _flipped,
     "turn": _turned,

@@ -132,6 +132,7 @@ def _label(name: str) -> tuple[str, float, str]:
     words, _, unit = name.rpartition("_")
     scale, shown = {
         "ms": (1.0, " ms"),
+        "mm": (1.0, " mm"),
         "hz": (1.0, " a second"),
         "bytes": (1 / 2**20, " MiB"),
         "number": (1.0, " of them"),
