@@ -234,4 +234,5 @@ class Inbox:
 def _session_of(sample: zenoh.Sample) -> str:
     """Return who publishes under the key without a name, where that is told: few publishers do."""
     info = sample.source_info
-    return "" if info is None else f"{info.source_id.zid}/{info.source_id.eid}"
+    who = None if info is None else info.source_id
+    return "" if who is None else f"{who.zid}/{who.eid}"

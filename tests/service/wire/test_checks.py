@@ -80,7 +80,7 @@ REFUSED = [
     (position_target((0, -INF, 0)), "position_m = [0, -inf, 0]", "must be finite"),
     (position_target((40.0, 0.0, 200.0)), "[40, 0, 200] is 204 m", "3 arm lengths; is it in mm?"),
     (position_target((0.0, 0.0, 0.91)), "0.91 m from the base", "is it in mm?"),
-    (position_target((1e300, 1e300, 0)), "inf m from the base", "is it in mm?"),
+    (position_target((1e300, 1e300, 0)), "1.41e+300 m from the base", "is it in mm?"),
     (in_frame(position_target((0, 0, 0.2)), "world"), "frame_id = 'world'", "allowed: 'base'"),
     (in_frame(position_target((0, 0, 0.2)), ""), "frame_id = ''", "allowed: 'base'"),
     (in_frame(position_target((0, 0, 0.2)), "tip"), "frame_id = 'tip'", "allowed: 'base'"),

@@ -48,7 +48,7 @@ def test_waypoints_are_taken_as_they_come() -> None:
         (circle_target(HOME, 0.0, 1.0), "radius_m = 0"),
         (circle_target(HOME, 0.02, -1.0), "frequency_hz = -1"),
         (circle_target(HOME, 0.02, 1.0, turns=-1.0), "turns = -1: 0 .without end. or more"),
-        (circle_target(HOME, 0.02, 1.0, normal=(0.0, 0.0, 0.0)), "a vector of some length"),
+        (circle_target(HOME, 0.02, 1.0, normal=(0.0, 0.0, 0.0)), "normal = .* points nowhere"),
         (circle_target((0.0, 0.0, 0.2), 0.25, 0.05), "the point at .* is out of reach"),
         (circle_target((40.0, 0.0, 200.0), 20.0, 1.0), "is it in mm"),
         (line_target(HOME, (0.03, 0.0, 0.2), 0.0), "period_s = 0"),
