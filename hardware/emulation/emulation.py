@@ -12,13 +12,14 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import CHAMBER_ANGLES_RAD, Arm, Array
 from pneuarm.hardware.emulation.faults import EmulatedFaults
-from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
-from pneuarm.hardware.simulator.pneumatics import Chamber, Valve
+from pneuarm.hardware.simulator.flow_valves import valve_of
+from pneuarm.hardware.simulator.parameters import NOMINAL, SimulatorParameters, draw
+from pneuarm.hardware.simulator.pneumatics import Chamber
 from pneuarm.hardware.simulator.rod import Rod
 
 LARGEST_STEP_S = 2.5e-3
 
-#: After a longer silence (s) the physics is at rest anyway: only this much of it is calculated.
+#: After a longer silence (s) the air is at rest, or nearly: only this much of it is calculated.
 _LONGEST_ADVANCE_S = 2.0
 
 #: The supply stands this much above the arm's largest pressure.
@@ -64,11 +65,17 @@ class EmulatedArm:
     ``setpoints_pa`` is what the terminal was last told, by its host or by its own watchdog.
     """
 
-    def __init__(self, arm: Arm, seed: int, record: DeviceRecord | None = None) -> None:
-        drawn = draw(SimulatorParameters(), seed, arm.n_sections)
+    def __init__(
+        self,
+        arm: Arm,
+        seed: int,
+        record: DeviceRecord | None = None,
+        nominal: SimulatorParameters = NOMINAL["servo"],
+    ) -> None:
+        drawn = draw(nominal, seed, arm.n_sections)
         self._arm, self._values, self._record = arm, drawn.values, record
         self._rod = Rod(arm, drawn)
-        self._valve = Valve(arm, drawn.values)
+        self._valve = valve_of(arm, drawn.values)
         self._chamber = Chamber(arm, drawn.values)
         self._shape = (arm.n_sections, 3)
         self._noise = np.random.Generator(np.random.PCG64([seed, 1]))

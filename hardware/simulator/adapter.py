@@ -7,8 +7,9 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.interface import Measurement
+from pneuarm.hardware.simulator.flow_valves import valve_of
 from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
-from pneuarm.hardware.simulator.pneumatics import Chamber, Valve
+from pneuarm.hardware.simulator.pneumatics import Chamber
 from pneuarm.hardware.simulator.rod import Rod
 
 #: Longest step of the physics; a longer time between two reads is cut into equal parts.
@@ -58,7 +59,7 @@ class SimulatedArm:
         """Put the arm at rest, vented; the next read sets its clock."""
         values = self.drawn.values
         self._rod.reset()
-        self._valve = Valve(self._arm, values)
+        self._valve = valve_of(self._arm, values)
         self._chamber = Chamber(self._arm, values)
         shape = (self._arm.n_sections, 3)
         self._noise = _Noise(shape, values.sensor_noise_pa, self.drawn.seed)

@@ -8,6 +8,7 @@ from pydantic import Field
 from pneuarm.controllers.arm.arm import Arm, uncalibrated
 from pneuarm.hardware.device import Address, Device, InMemory
 from pneuarm.hardware.interface import Hardware
+from pneuarm.hardware.simulator.parameters import NOMINAL, Valves, draw
 from pneuarm.hardware.tables.arm import ArmConfig
 from pneuarm.hardware.tables.table import Table
 
@@ -24,6 +25,14 @@ class SimulatorConfig(Table):
             ge=0, lt=2**32, description="which arm of the family; see [simulator.md](simulator.md)"
         ),
     ] = 0
+    valves: Annotated[
+        Valves,
+        Field(
+            description="`servo`: fast, and alike in both directions; `itv`: regulators, as slow "
+            "and lopsided as SMC ITV ones in public logs; `onoff`: switched valves; see "
+            "[simulator.md](simulator.md#valves)"
+        ),
+    ] = "servo"
     arm: Annotated[
         ArmConfig | None,
         Field(
@@ -45,9 +54,7 @@ def simulated_arm(config: SimulatorConfig, arm: Arm) -> Arm:
 
 def drawn_parameters(config: SimulatorConfig, arm: Arm) -> dict[str, float]:
     """Return the seed and every parameter that is drawn from it, to repeat a run."""
-    from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
-
-    drawn = draw(SimulatorParameters(), config.seed, arm.n_sections).as_dict()
+    drawn = draw(NOMINAL[config.valves], config.seed, arm.n_sections).as_dict()
     del drawn["lowest_mode_hz"]  # follows from the others, and is known once the rod is built
     return drawn
 
@@ -63,9 +70,8 @@ class Simulator(Device[SimulatorConfig]):
     def build(self, config: SimulatorConfig, arm: Arm) -> Hardware:
         """Make the arm of the seed."""
         from pneuarm.hardware.simulator.adapter import SimulatedArm
-        from pneuarm.hardware.simulator.parameters import SimulatorParameters
 
-        return SimulatedArm(simulated_arm(config, arm), SimulatorParameters(), config.seed)
+        return SimulatedArm(simulated_arm(config, arm), NOMINAL[config.valves], config.seed)
 
     def address(self, config: SimulatorConfig) -> Address:
         """Return that each daemon makes its own."""

@@ -47,6 +47,7 @@ class Valve:
         self._values = values
         self._play = Play(_half_loop_pa(arm, values.valve_hysteresis_fraction))
         self._pending: deque[tuple[float, Array | None]] = deque()
+        self._is_venting = False
         self.pressures_pa = np.zeros((arm.n_sections, 3))
 
     def command(self, pressures_pa: Array, time_s: float) -> None:
@@ -60,11 +61,12 @@ class Valve:
         self._pending.append((time_s + self._values.valve_delay_s, None))
 
     def advance(self, from_s: float, to_s: float) -> None:
-        """Follow the setpoints from one time to the other, exactly for steps of any length."""
+        """Follow the setpoints from one time to the other."""
         while self._pending and self._pending[0][0] <= to_s:
             due_s, setpoints = self._pending.popleft()
             self._relax(due_s - from_s)
             from_s = max(from_s, due_s)
+            self._is_venting = setpoints is None
             if setpoints is None:
                 self._play.release()
             else:
@@ -72,6 +74,7 @@ class Valve:
         self._relax(to_s - from_s)
 
     def _relax(self, duration_s: float) -> None:
+        """Let time pass without anything new: here exactly, for steps of any length."""
         if duration_s > 0.0:
             rest = exp(-duration_s / self._values.valve_time_constant_s)
             self.pressures_pa = self._play.output + rest * (self.pressures_pa - self._play.output)

@@ -116,6 +116,7 @@ def _add_emulated_devices(commands: Subparsers) -> None:
         parser.add_argument("--arm", default="paper", metavar="PRESET|CONFIG.toml")
         parser.add_argument("--seed", type=_SEED, default=0, help="seed of the arm behind it")
         parser.add_argument("--record", type=Path, metavar="FILE", help="what reaches it: JSON")
+        _add_valves(parser, None, "those of --arm's file")
         device.add_arguments(parser)
 
 
@@ -125,6 +126,14 @@ def _add_adapter(demo: Parser) -> None:
 
     names = (SIMULATOR.name, *(device.name for device in emulated_devices()))
     demo.add_argument("--adapter", choices=names, default=SIMULATOR.name)
+    _add_valves(demo, "servo", "servo")
+
+
+def _add_valves(parser: Parser, default: str | None, said: str) -> None:
+    from pneuarm.hardware.simulator.parameters import NOMINAL
+
+    help_text = f"valves of the simulated arm (default: {said})"
+    parser.add_argument("--valves", choices=tuple(NOMINAL), default=default, help=help_text)
 
 
 def _add_emulated_camera(devices: Subparsers) -> None:

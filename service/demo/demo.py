@@ -31,7 +31,7 @@ _END_S = 70.0  # the daemon's own last resort comes after 60 s
 
 def demo(arguments: argparse.Namespace) -> int:
     """Run the show and print its table."""
-    with emulated(arguments.adapter, arguments.arm, arguments.seed) as device:
+    with emulated(arguments.adapter, arguments.arm, arguments.seed, arguments.valves) as device:
         configuration = check(_laid_over(arguments, device), "the demo")
         with Screen(configuration) as screen:
             drawn = [
@@ -45,7 +45,7 @@ def demo(arguments: argparse.Namespace) -> int:
 
 def _laid_over(arguments: argparse.Namespace, device: dict[str, object]) -> dict[str, object]:
     laid = load(preset=arguments.arm).model_dump(exclude_none=True)
-    for above in (device, tables(arguments.seed)):
+    for above in (device, tables(arguments.seed, arguments.valves)):
         for name, value in above.items():
             laid[name] = laid[name] | value if isinstance(value, dict) else value
     return laid

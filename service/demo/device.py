@@ -17,7 +17,7 @@ from pneuarm.service.emulators.command import LAST_LINE
 
 
 @contextmanager
-def emulated(adapter: str, arm: str, seed: int) -> Iterator[dict[str, object]]:
+def emulated(adapter: str, arm: str, seed: int, valves: str) -> Iterator[dict[str, object]]:
     """Run an emulator while the context lasts; yields its tables of the configuration.
 
     A simulated arm needs none. Raises PneuarmError where the emulator does not start.
@@ -35,7 +35,7 @@ def emulated(adapter: str, arm: str, seed: int) -> Iterator[dict[str, object]]:
         emulator = subprocess.Popen(
             [
                 *(sys.executable, "-m", "pneuarm", "emulate", adapter),
-                *("--arm", str(path), "--seed", str(seed)),
+                *("--arm", str(path), "--seed", str(seed), "--valves", valves),
             ],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

@@ -11,6 +11,7 @@ from pathlib import Path
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.hardware.device import EmulatedDevice
 from pneuarm.hardware.emulation.emulation import DeviceRecord, EmulatedArm
+from pneuarm.hardware.simulator.parameters import NOMINAL
 from pneuarm.hardware.transports.transport_faults import start_console
 from pneuarm.service.configuration.configuration import PRESETS, Configuration, load
 from pneuarm.service.configuration.devices import AnyDevice, devices
@@ -48,7 +49,8 @@ def _emulated_arm(arguments: argparse.Namespace, configuration: Configuration) -
         record = None if arguments.record is None else DeviceRecord(arguments.record)
     except OSError as error:
         raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
-    return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record)
+    nominal = NOMINAL[arguments.valves or configuration.simulator.valves]
+    return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record, nominal)
 
 
 def _may_be_file(path: Path) -> bool:

@@ -23,6 +23,7 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "exceptions": tables.make_exceptions,
     "rooms": tables.make_rooms,
     "simulator": tables.make_simulator,
+    "valves": tables.make_valves,
 }
 
 

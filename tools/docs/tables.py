@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from pneuarm.controllers.arm import errors
-from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.hardware.simulator.parameters import NOMINAL, SimulatorParameters
 from pneuarm.service.configuration.configuration import PRESETS, load
 from pneuarm.service.modes.mode import TABLE, Mode, ModeEvent
 from pneuarm.service.monitors.monitors import MONITORS
@@ -61,17 +61,42 @@ def _below(kind: type[Exception]) -> list[list[str]]:
     return rows
 
 
+#: Parameters that are those of the valves.
+_VALVES = "valve_"
+
+
 def make_simulator(name: str) -> str:
-    """Return the nominal parameters of the simulated arm."""
+    """Return the nominal parameters of the simulated arm, but for its valves."""
     rows = [
         [f"`{part.name}`", str(part.default), _unit(part.name), part.metadata["meaning"]]
         for part in fields(SimulatorParameters)
+        if not part.name.startswith(_VALVES)
     ]
     return table(("parameter", "nominal", "unit", "meaning"), rows)
 
 
+def make_valves(name: str) -> str:
+    """Return the nominal parameters of each kind of valves, side by side."""
+    parts = {part.name: part for nominal in NOMINAL.values() for part in fields(nominal)}
+    rows = []
+    for part in parts.values():
+        if part.name.startswith(_VALVES):
+            values = [f"{getattr(nominal, part.name, '')}" for nominal in NOMINAL.values()]
+            rows.append([f"`{part.name}`", *values, _unit(part.name), part.metadata["meaning"]])
+    return table(("parameter", *(f"`{name}`" for name in NOMINAL), "unit", "meaning"), rows)
+
+
 #: Unit of a parameter by the end of its name.
-_UNITS = {"kg_m": "kg/m", "kg": "kg", "hz": "Hz", "pa": "Pa", "m": "m", "s": "s"}
+_UNITS = {
+    "m3_s_pa": "m^3/(s Pa)",
+    "kg_m": "kg/m",
+    "m3": "m^3",
+    "kg": "kg",
+    "hz": "Hz",
+    "pa": "Pa",
+    "m": "m",
+    "s": "s",
+}
 
 
 def _unit(name: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.targets.targets import Target
 from pneuarm.hardware.interface import Hardware, Measurement
+from pneuarm.hardware.simulator.parameters import Valves
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
@@ -67,10 +68,12 @@ class Watched:
         self.device.close()
 
 
-def configuration_of(preset: str = "paper", rate_hz: float = 500.0, seed: int = 0) -> Configuration:
+def configuration_of(
+    preset: str = "paper", rate_hz: float = 500.0, seed: int = 0, valves: Valves = "servo"
+) -> Configuration:
     whole = load(preset=preset)
     control = whole.control.model_copy(update={"rate_hz": rate_hz})
-    simulator = whole.simulator.model_copy(update={"seed": seed})
+    simulator = whole.simulator.model_copy(update={"seed": seed, "valves": valves})
     return whole.model_copy(update={"control": control, "simulator": simulator})
 
 

@@ -9,6 +9,7 @@ import pytest
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.hardware.emulation.emulation import DeviceRecord, EmulatedArm
+from pneuarm.hardware.simulator.parameters import NOMINAL, Valves
 from pneuarm.hardware.transports.transport_faults import TransportFaults
 from tools.rig.arms import paper_arm
 
@@ -123,3 +124,24 @@ def test_transport_faults_last_as_long_as_said() -> None:
     assert not faults.inject("leak 0", 11.0)
     with pytest.raises(InvalidInput):
         faults.inject("slow", 11.0)
+
+
+@pytest.mark.parametrize("valves", ["itv", "onoff"])
+def test_faults_break_every_kind_of_valves_alike(valves: Valves) -> None:
+    """A trapped chamber stays, a lost supply takes the air; cleared, all of it goes out."""
+    arm = EmulatedArm(paper_arm(), 0, nominal=NOMINAL[valves])
+    arm.advance(0.0)
+    arm.set_pressures_pa(SETPOINTS_PA, 0.0)
+    for number in range(300):
+        arm.advance(0.02 * number)
+    np.testing.assert_allclose(arm.true_pressures_pa, SETPOINTS_PA, atol=4000.0)
+    arm.inject("valve-stuck-closed 0")
+    arm.inject("supply-lost")
+    for number in range(300, 600):
+        arm.advance(0.02 * number)
+    np.testing.assert_allclose(arm.true_pressures_pa, [[0.0, 0.0, 0.0]], atol=4000.0)
+    arm.inject("clear")
+    arm.zero_all(12.0, "watchdog")
+    for number in range(600, 900):
+        arm.advance(0.02 * number)
+    assert np.abs(arm.true_pressures_pa).max() < 1.0

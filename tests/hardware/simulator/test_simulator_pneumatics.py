@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Array
-from pneuarm.hardware.simulator.parameters import SimulatorParameters
+from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
 from pneuarm.hardware.simulator.pneumatics import Chamber, Play, Valve
 from tests.hardware.simulator.test_simulator import PAPER
 
@@ -89,6 +89,34 @@ def test_vent_ends_at_zero_where_a_command_of_zero_does_not() -> None:
     valve.vent(6.0)
     valve.advance(6.0, 8.0)
     np.testing.assert_allclose(valve.pressures_pa, 0.0, atol=1e-6)
+
+
+def test_the_valves_of_a_seed_are_what_they_were_before_there_were_others() -> None:
+    """Drawn values and pressures, recorded when `servo` was all there was."""
+    values = draw(NOMINAL, 5, 1).values
+    assert values.valve_time_constant_s == 0.05720085313885244
+    assert values.valve_delay_s == 0.004816946410839997
+    assert values.valve_resolution_pa == 409.05503878048904
+    assert values.valve_hysteresis_fraction == 0.008195030842908672
+    assert draw(NOMINAL, 5, 1).stiffness_factors == (1.189674477303702,)
+    valve, now_s, found = Valve(PAPER, values), 0.0, []
+    for wanted in ([5e4, -3e4, 1e4], [-2e4, 6e4, 1.2e4], None, [8.9e4, -8.9e4, 0.0]):
+        if wanted is None:
+            valve.vent(now_s)
+        else:
+            valve.command(np.array([wanted]), now_s)
+        for step_s in (0.0021, 0.0173, 0.06):
+            valve.advance(now_s, now_s + step_s)
+            now_s += step_s
+        found.append(valve.pressures_pa[0])
+    recorded = [
+        [35819.438136513854, -21217.131788280843, 6614.825440047827],
+        [-4048.1983833128124, 37336.296103837856, 9954.670008807485],
+        [-1433.523754172299, 10619.53237974171, 2728.1185802695395],
+        [64070.300759568825, -61777.92130743319, 680.8052584439715],
+    ]
+    # Another machine's exp may differ in its last bit.
+    np.testing.assert_allclose(found, recorded, rtol=1e-14)
 
 
 def test_vent_overrules_what_was_written_before() -> None:

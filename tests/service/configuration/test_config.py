@@ -165,6 +165,7 @@ WRONG = [
     ("[rerun]\nport = 70000", "rerun.port", ("70000", "65535")),
     ("[rerun]\nport = 1.5", "rerun.port", ("1.5", "integer")),
     ("[simulator]\nseed = -1", "simulator.seed", ("-1", "0")),
+    ("[simulator]\nvalves = 'fast'", "simulator.valves", ("'fast'", "'servo'", "'itv'", "'onoff'")),
     ("[zenoh]\nlisten = []", "zenoh.listen", ("[]", "at least 1")),
     ("[arm]\nname = 'My Arm'", "arm.name", ("'My Arm'", "a-z")),
     ("[arm]\ngravity_m_s2 = [0, 0]", "arm.gravity_m_s2[2]", ("missing",)),

@@ -30,11 +30,11 @@ def test_every_device_has_an_arm_that_it_can_move(device: AnyDevice) -> None:
 
 
 def test_the_simulator_needs_nothing_beside_it() -> None:
-    with emulated("simulator", "paper", 0) as tables:
+    with emulated("simulator", "paper", 0, "servo") as tables:
         assert tables == {}
 
 
 def test_the_daemon_is_told_of_the_arm_that_its_device_moves() -> None:
-    with emulated("esp32", "paper", 0) as tables:
+    with emulated("esp32", "paper", 0, "itv") as tables:
         assert tables["arm"] == fitting(ESP32, "paper").arm.model_dump(exclude_none=True)
         assert tables["hardware"] == {"adapter": "esp32", "accept_no_watchdog": True}
