@@ -26,6 +26,7 @@ from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.controllers.calibration.worth import held_out_mean_m
 from pneuarm.controllers.geometry.rotations import rotation_from_vector
 from pneuarm.hardware.interface import Hardware, Measurement
+from pneuarm.hardware.simulator.parameters import NOMINAL, Valves
 from pneuarm.service.calibration.files import calibrated
 from pneuarm.service.calibration.simulated import record_simulated
 from pneuarm.service.configuration.configuration import Configuration, check
@@ -171,8 +172,8 @@ class _Exchanged:
 class Recorder:
     """Recordings of one arm of the family, each made once: most cases move it in the same way."""
 
-    def __init__(self, preset: str, seed: int, quick: bool) -> None:
-        self._right, self._quick = configuration_of(preset, 250.0, seed), quick
+    def __init__(self, preset: str, seed: int, quick: bool, valves: Valves = "servo") -> None:
+        self._right, self._quick = configuration_of(preset, 250.0, seed, valves), quick
         self._kept: dict[Any, Recording] = {}
 
     def configuration(self, case: Case) -> Configuration:
@@ -251,9 +252,10 @@ def main() -> int:
     parser.add_argument("--preset", default="paper", choices=("paper", "table1", "trunk"))
     parser.add_argument("--seed", type=int, default=0, help="arm of the family (default 0)")
     parser.add_argument("--mixtures", type=int, default=20)
+    parser.add_argument("--valves", choices=tuple(NOMINAL), default="servo")
     parser.add_argument("--quick", action="store_true", help="an even rod, always at rest")
     arguments = parser.parse_args()
-    recorder = Recorder(arguments.preset, arguments.seed, arguments.quick)
+    recorder = Recorder(arguments.preset, arguments.seed, arguments.quick, arguments.valves)
     right, counts = Row("", np.nan, ""), {"refused": 0, "found": 0, "WRONG": 0}
     for case in cases(arguments.mixtures):
         row = judged(recorder, case)

@@ -19,6 +19,7 @@ from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import PositionTarget
+from pneuarm.hardware.simulator.parameters import NOMINAL, Valves
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 from tools.rig.arms import random_lengths
@@ -29,9 +30,9 @@ RATE_HZ = 250.0
 SHARE, TARGETS, SECONDS, AVERAGED_S = 0.5, 15, 3.0, 0.4
 
 
-def calibrated_arm(preset: str, seed: int) -> Configuration:
+def calibrated_arm(preset: str, seed: int, valves: Valves = "servo") -> Configuration:
     """Calibrate a simulated arm; the configuration holds the result, and still simulates it."""
-    return calibrate_simulated(configuration_of(preset, RATE_HZ, seed))
+    return calibrate_simulated(configuration_of(preset, RATE_HZ, seed, valves))
 
 
 def tip_errors_percent(configuration: Configuration, targets: Array) -> Array:
@@ -66,11 +67,13 @@ def targets_of(preset: str, seed: int, number: int = TARGETS) -> Array:
     )
 
 
-def measure(preset: str, seed: int, number: int = TARGETS) -> dict[str, Any]:
+def measure(
+    preset: str, seed: int, number: int = TARGETS, valves: Valves = "servo"
+) -> dict[str, Any]:
     """Errors of one arm of the family, before and after."""
     targets = targets_of(preset, seed, number)
-    before = tip_errors_percent(configuration_of(preset, RATE_HZ, seed), targets)
-    after = tip_errors_percent(calibrated_arm(preset, seed), targets)
+    before = tip_errors_percent(configuration_of(preset, RATE_HZ, seed, valves), targets)
+    after = tip_errors_percent(calibrated_arm(preset, seed, valves), targets)
     both = np.isfinite(before) & np.isfinite(after)
     before, after = before[both], after[both]
     return {
@@ -87,18 +90,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--preset", default="paper", choices=("paper", "table1", "trunk"))
     parser.add_argument("--seeds", type=int, default=10, help="arms of the family (default 10)")
+    parser.add_argument("--valves", choices=tuple(NOMINAL), default="servo")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     rows = []
     if not arguments.json:
         print("seed  before mean, max %   after mean, max %   times smaller")
     for seed in range(arguments.seeds):
-        rows.append(measure(arguments.preset, seed))
+        rows.append(measure(arguments.preset, seed, valves=arguments.valves))
         if not arguments.json:
             print(_line(rows[-1]), flush=True)
     worst = max(rows, key=lambda row: row["after_percent"]["mean"])
     if arguments.json:
-        print(json.dumps({"preset": arguments.preset, "rows": rows, "worst": worst}))
+        told = {"preset": arguments.preset, "valves": arguments.valves}
+        print(json.dumps({**told, "rows": rows, "worst": worst}))
     else:
         print(f"worst: seed {worst['seed']}, mean {worst['after_percent']['mean']:.2f} %")
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.targets.targets import CircleTarget
+from pneuarm.hardware.simulator.parameters import NOMINAL
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 from tools.bench.calibrated import targets_of
@@ -174,12 +175,17 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="one JSON object instead of lines")
     parser.add_argument("--seeds", type=int, nargs="+", default=[10, 11, 12, 13])
     parser.add_argument("--targets", type=int, default=50, help="for each seed (default 50)")
+    parser.add_argument("--valves", choices=tuple(NOMINAL), default="servo")
     parser.add_argument("--alone", action="store_true", help="only calibrated and with the camera")
     arguments = parser.parse_args()
-    arms = [configuration_of("paper", RATE_HZ, seed) for seed in arguments.seeds]
+    arms = [configuration_of("paper", RATE_HZ, seed, arguments.valves) for seed in arguments.seeds]
     known = [_calibrated(arm) for arm in arms]
     few = max(1, arguments.targets // 5)
-    found: Row = {"seeds": arguments.seeds, "rate_hz": RATE_HZ}
+    found: Row = {
+        "seeds": arguments.seeds,
+        "rate_hz": RATE_HZ,
+        "valves": arguments.valves,
+    }
     found["calibrated"] = _measured("calibrated", known, True, arguments.targets)
     if not arguments.alone:
         found["uncalibrated"] = _measured("uncalibrated", arms, True, few)

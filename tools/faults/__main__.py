@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+from pneuarm.hardware.simulator.parameters import NOMINAL
 from tools.faults import (
     client_faults,
     device_faults,
@@ -33,16 +34,17 @@ def main() -> int:
     """Run the campaign; 1 if an invariant was broken, 130 after Ctrl-C."""
     options = _parse()
     chosen = _chosen(options.only)
-    report, begin = Report(options.seed, faults=len(chosen)), time.monotonic()
+    report = Report(options.seed, faults=len(chosen), valves=options.valves)
+    begin = time.monotonic()
     try:
-        for row in run_campaign(chosen, options.times, options.seed):
+        for row in run_campaign(chosen, options.times, options.seed, options.valves):
             report.rows.append(row)
             report.seconds = time.monotonic() - begin
             if options.write and not options.only:
                 write_page(options.write, report.markdown())
         if not options.only or "stop" in options.only:
             tell("the stop's latency")
-            report.stop = measure_stop(options.stops)
+            report.stop = measure_stop(options.stops, options.valves)
     except KeyboardInterrupt:
         report.interrupted = True
         tell("\ninterrupted; this is what there is")
@@ -63,6 +65,9 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--times", type=int, default=30, help="injections of each fault")
     parser.add_argument("--seed", type=int, default=0, help="of the first injection of each fault")
     parser.add_argument("--stops", type=int, default=200, help="stops and round trips to measure")
+    parser.add_argument(
+        "--valves", choices=tuple(NOMINAL), default="servo", help="of every arm (default servo)"
+    )
     parser.add_argument("--write", type=Path, metavar="PAGE", help="put the table into this page")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     parser.add_argument("--list", action="store_true", help="print the names and end")

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from pneuarm.controllers.arm.arm import Arm
+from pneuarm.hardware.simulator.parameters import Valves
 from pneuarm.service.configuration.configuration import load
 from tools.faults.clock import settable_clock
 from tools.faults.device_audit import audit_device
@@ -34,9 +35,9 @@ def tell(text: str, end: str = "\n") -> None:
 class FaultRun:
     """All injections of one fault; what has been done when it is interrupted is kept."""
 
-    def __init__(self, fault: Fault, times: int, seed: int) -> None:
+    def __init__(self, fault: Fault, times: int, seed: int, valves: Valves) -> None:
         self.row = Row(fault, unable=fault.unable())
-        self._fault, self._seeds = fault, range(seed, seed + times)
+        self._fault, self._seeds, self._valves = fault, range(seed, seed + times), valves
         self._unaudited: list[Injection] = []
         self._rig: Rig | None = None
         self._open = ExitStack()
@@ -86,7 +87,9 @@ class FaultRun:
             if self._fault.clock:
                 folder = self._open.enter_context(tempfile.TemporaryDirectory())
                 self._open.enter_context(settable_clock(Path(folder)))
-            self._rig = self._open.enter_context(Rig(self._fault.tables, self._fault.device))
+            self._rig = self._open.enter_context(
+                Rig(self._fault.tables, self._fault.device, self._valves)
+            )
         self._rig.move()
         return self._rig
 
@@ -128,12 +131,14 @@ class FaultRun:
             audit_device(rig.emulator.record, arm, self._unaudited, rig.emulator.jitter_s)
 
 
-def run_campaign(faults: list[Fault], times: int, seed: int) -> Iterator[Row]:
+def run_campaign(
+    faults: list[Fault], times: int, seed: int, valves: Valves = "servo"
+) -> Iterator[Row]:
     """Run fault after fault; yields every row as it is done, the interrupted one too."""
     for fault in faults:
         tell(f"{fault.name:40} ", end="")
         begin_s = time.monotonic()
-        run = FaultRun(fault, times, seed)
+        run = FaultRun(fault, times, seed, valves)
         try:
             run.run()
         finally:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from pneuarm.hardware.simulator.parameters import Valves
 from tools.faults.program import Program
 
 #: Gauge pressure below which a chamber counts as empty, Pa.
@@ -50,8 +51,8 @@ def _own_tables(what: str) -> dict[str, Any]:
 class Emulator:
     """`pneuarm emulate WHAT`, with the tables that make a daemon use it."""
 
-    def __init__(self, what: str, folder: Path) -> None:
-        own = _own_tables(what)
+    def __init__(self, what: str, folder: Path, valves: Valves = "servo") -> None:
+        own = _own_tables(what) | {"simulator": {"valves": valves}}
         arm = folder / f"{what}.toml"
         arm.write_text(tomli_w.dumps(own))
         self.jitter_s = 0.0 if what.startswith("festo") else _SERIAL_JITTER_S

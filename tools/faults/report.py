@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from pneuarm.hardware.simulator.parameters import Valves
 from tools.faults.fault import Row
 from tools.faults.stop_latency import StopLatency
 
@@ -23,13 +24,14 @@ class Report:
     interrupted: bool = False
     #: How many faults there are to come in all; 0 where that is not known.
     faults: int = 0
+    valves: Valves = "servo"
 
     @property
     def broken(self) -> list[str]:
         """One line for every invariant that was broken, and how to see it again."""
         lines = [
             f"{i.fault}, seed {i.seed}: {_line(what)}  (again: python -m tools.faults --only "
-            f"{i.fault!r} --times 1 --seed {i.seed})"
+            f"{i.fault!r} --times 1 --seed {i.seed} --valves {self.valves})"
             for row in self.rows
             for i in row.injections
             for what in i.broken
@@ -57,8 +59,9 @@ class Report:
         injections = sum(len(row.injections) for row in self.rows)
         day = datetime.now(UTC).strftime("%Y-%m-%d")
         text = [
-            f"`make faults`, {day}: {injections} injections in {self.seconds / 60:.0f} min, seed "
-            f"{self.seed}, {len(self.broken)} invariants broken{self._unfinished}.",
+            f"`make faults`, {day}: {injections} injections in {self.seconds / 60:.0f} min, "
+            f"{self.valves} valves, seed {self.seed}, {len(self.broken)} invariants "
+            f"broken{self._unfinished}.",
             self.table(),
         ]
         if lines := [f"- {line}" for row in self.rows if (line := figures(row))]:
@@ -78,6 +81,7 @@ class Report:
         """The same for programs."""
         return {
             "seed": self.seed,
+            "valves": self.valves,
             "seconds": self.seconds,
             "interrupted": self.interrupted,
             "broken": self.broken,
@@ -162,8 +166,8 @@ def write_again(page: Path, report: Report) -> None:
     injections = sum(len(row.injections) for row in report.rows)
     lines += [
         "",
-        f"Again: {names}: {injections} injections, seed {report.seed}, {len(report.broken)} "
-        "invariants broken; these rows are of that run.",
+        f"Again: {names}: {injections} injections, {report.valves} valves, seed {report.seed}, "
+        f"{len(report.broken)} invariants broken; these rows are of that run.",
         "",
         *(f"- {line}" for row in report.rows if (line := figures(row))),
         *(f"- {line}" for line in report.broken),

@@ -12,6 +12,7 @@ import pytest
 
 from pneuarm import Client
 from pneuarm.controllers.arm.errors import PneuarmError
+from pneuarm.hardware.simulator.parameters import Valves
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import load
 from tools.faults.emulator import EMPTY_PA, Emulator
@@ -21,8 +22,8 @@ from tools.rig.daemon import Daemon, health_of, wait_for
 
 T = TypeVar("T")
 
-#: After its daemon has ended an emulated arm is given so long to lose its air, s.
-EMPTIES_S = 1.0
+#: After its daemon has ended an emulated arm is given so long to lose its air, s, by its valves.
+_EMPTIES_S: dict[Valves, float] = {"servo": 1.0, "itv": 6.0, "onoff": 3.0}
 
 #: Small and quick: the target's timeout is the daemon's own, a full disk vents soon.
 TABLES: dict[str, dict[str, Any]] = {
@@ -34,12 +35,15 @@ TABLES: dict[str, dict[str, Any]] = {
 class Rig:
     """What one fault is injected into; a context manager that leaves no process behind."""
 
-    def __init__(self, tables: dict[str, dict[str, Any]], device: str = "simulator") -> None:
+    def __init__(
+        self, tables: dict[str, dict[str, Any]], device: str = "simulator", valves: Valves = "servo"
+    ) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="pneuarm-faults-")
         folder = Path(self._folder.name)
-        self.emulator = None if device == "simulator" else Emulator(device, folder)
+        self.emulator = None if device == "simulator" else Emulator(device, folder, valves)
         device_tables = {} if self.emulator is None else self.emulator.tables
-        own: dict[str, dict[str, Any]] = {}
+        own: dict[str, dict[str, Any]] = {"simulator": {"valves": valves}}
+        self._empties_s = _EMPTIES_S[valves]
         for part in (TABLES, device_tables, tables):
             for name, table in part.items():
                 own[name] = own.get(name, {}) | table
@@ -234,7 +238,7 @@ class Rig:
         """Wait for the air to go out of an emulated arm; what stays in it the record shows."""
         if self.emulator is not None:
             with contextlib.suppress(pytest.fail.Exception):
-                wait_for(self.emulator.is_empty, "an empty arm", EMPTIES_S)
+                wait_for(self.emulator.is_empty, "an empty arm", self._empties_s)
 
     def _is_reset(self) -> bool:
         """Reset as often as it takes: a device that is away must come back first."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import zenoh
 
+from pneuarm.hardware.simulator.parameters import Valves
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import full_key
 from pneuarm.service.network.sessions import open_connected
@@ -48,10 +49,10 @@ class StopLatency:
         }
 
 
-def measure_stop(times: int) -> StopLatency:
+def measure_stop(times: int, valves: Valves) -> StopLatency:
     """Stop a ready arm again and again; in between a ball goes to and fro over the router."""
     found = StopLatency()
-    with Rig({}) as rig:
+    with Rig({}, valves=valves) as rig:
         ball = Ball(rig)
         calls_ns = []
         for _ in range(times):

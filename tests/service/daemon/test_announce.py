@@ -1,16 +1,19 @@
 """What the daemon says on its terminal: the facts, warnings, events, no flood."""
 
 import multiprocessing
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
+from pneuarm.hardware.simulator.parameters import NOMINAL, Valves
 from pneuarm.logs.rings.rings import MessageWriter, Rings
 from pneuarm.logs.rings.status import RecorderStatus, ViewerStatus
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import EVENT, TARGET
 from pneuarm.service.configuration.configuration import check, load
 from pneuarm.service.daemon.announce import Announcer, event_line, start_facts
+from pneuarm.service.daemon.info import info_of
 from pneuarm.service.processes.shared import Shared
 from pneuarm.service.processes.usage import ProcessTable
 
@@ -44,10 +47,10 @@ def warnings(lines: list[str]) -> list[str]:
 
 
 def test_every_fact_is_one_line() -> None:
-    lines = facts(simulator={"seed": 5})
+    lines = facts(simulator={"seed": 5, "valves": "itv"})
     assert lines == [
         "arm        paper: 1 section, 3 chambers",
-        "adapter    simulator (device simulator:paper, seed 5)",
+        "adapter    simulator (device simulator:paper, seed 5, itv valves)",
         "rate       1000 Hz, law qp_ik",
         "real time  priority 80 granted, memory locked",
         "zenoh      tcp/127.0.0.1:7447",
@@ -166,3 +169,15 @@ def test_an_event_is_one_line_with_cause_and_remedy() -> None:
     assert event_line(event) == expected
     bare = pb.Event(time_unix_ns=NOON_NS, level=pb.INFO, source="gateway", text="hello")
     assert event_line(bare) == "12:00:00.000 info    gateway: hello"
+
+
+@pytest.mark.parametrize("valves", NOMINAL)
+def test_the_facts_of_a_session_hold_what_its_valves_were_drawn_from(valves: Valves) -> None:
+    """By the names of their own parameters, with the nominal ones; the name is in the file's."""
+    configuration = check(load().model_dump(exclude_none=True) | {"simulator": {"valves": valves}})
+    info = info_of(configuration, configuration.build_arm(), "/x/session.mcap")
+    assert f'valves = "{valves}"' in info.config_toml
+    for name, nominal in asdict(NOMINAL[valves]).items():
+        assert info.simulator[f"nominal_{name}"] == nominal
+        if name != "lowest_mode_hz":
+            assert 0.8 * nominal <= info.simulator[name] <= 1.2 * nominal
