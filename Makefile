@@ -82,7 +82,7 @@ proto:
 
 # Needs uv; only for whoever changes the dependencies.
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
-    --no-emit-index-url --no-annotate --no-header --extra pictures --group dev --no-emit-package pneuarm-client
+    --no-emit-index-url --no-annotate --no-header --extra mujoco --extra pictures --group dev --no-emit-package pneuarm-client
 lock:
 	$(LOCK) --output-file requirements.lock
 	$(LOCK) --group bench --constraint requirements.lock --output-file requirements-bench.lock
@@ -92,7 +92,7 @@ LOWEST := .venv-lowest
 test-lowest:
 	uv venv --quiet --clear --seed --python $(PYTHON) $(LOWEST)
 	uv pip install --quiet --python $(LOWEST) --resolution lowest-direct \
-	    --requirements pyproject.toml --extra pictures --group dev --editable .
+	    --requirements pyproject.toml --extra mujoco --extra pictures --group dev --editable .
 	$(LOWEST)/bin/pytest -n 2 --dist loadgroup -m "not slow"
 
 clean:

@@ -95,6 +95,9 @@ class Device(ABC, Generic[Config]):
         """Name of its table in the configuration."""
         return self.name.replace("-", "_")
 
+    def require(self) -> None:
+        """Raise NotInstalled where a package is missing that only this device needs."""
+
     @abstractmethod
     def build(self, config: Config, arm: Arm) -> "Hardware":
         """Make the adapter; touches no device.

@@ -1,6 +1,8 @@
 """The simulated arm behind the interface of every device."""
 
+from collections.abc import Callable
 from math import ceil
+from typing import Protocol
 
 import numpy as np
 
@@ -8,7 +10,7 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.interface import Measurement
 from pneuarm.hardware.simulator.flow_valves import valve_of
-from pneuarm.hardware.simulator.parameters import SimulatorParameters, draw
+from pneuarm.hardware.simulator.parameters import DrawnParameters, SimulatorParameters, draw
 from pneuarm.hardware.simulator.pneumatics import Chamber
 from pneuarm.hardware.simulator.rod import Rod
 
@@ -17,6 +19,28 @@ LARGEST_STEP_S = 2.5e-3
 
 #: Sensor noise is drawn for this many readings at once.
 _NOISE_BLOCK = 256
+
+
+class Body(Protocol):
+    """What the chambers move. ``lowest_mode_hz`` is the drawn arm's own, at rest."""
+
+    lowest_mode_hz: float
+
+    def reset(self) -> None:
+        """Put the arm at rest: vented, hanging as its gravity has it."""
+        ...
+
+    def step(self, lengthening_m: Array, step_s: float) -> None:
+        """Advance by ``step_s`` under lengthenings (n_chambers,) of unloaded chambers."""
+        ...
+
+    def tip(self) -> tuple[Array, Array]:
+        """Tip position (3,) in m and rotation (3, 3), in the base frame; copies."""
+        ...
+
+
+#: Makes the body of a drawn arm; raises InvalidInput for one that cannot hold itself.
+MakeBody = Callable[[Arm, DrawnParameters], Body]
 
 
 class _Noise:
@@ -44,11 +68,13 @@ class SimulatedArm:
     log.
     """
 
-    def __init__(self, arm: Arm, nominal: SimulatorParameters, seed: int) -> None:
+    def __init__(
+        self, arm: Arm, nominal: SimulatorParameters, seed: int, make_body: MakeBody = Rod
+    ) -> None:
         drawn = draw(nominal, seed, arm.n_sections)
         self._arm = arm
-        self._rod = Rod(arm, drawn)
-        self.drawn = drawn.with_lowest_mode(self._rod.lowest_mode_hz)
+        self._body = make_body(arm, drawn)
+        self.drawn = drawn.with_lowest_mode(self._body.lowest_mode_hz)
         self._low_pa = arm.per_chamber("pressure_min_pa")
         self._high_pa = arm.per_chamber("pressure_max_pa")
         self._no_lengths = np.full((arm.n_sections, 3), np.nan)
@@ -58,7 +84,7 @@ class SimulatedArm:
     def connect(self) -> None:
         """Put the arm at rest, vented; the next read sets its clock."""
         values = self.drawn.values
-        self._rod.reset()
+        self._body.reset()
         self._valve = valve_of(self._arm, values)
         self._chamber = Chamber(self._arm, values)
         shape = (self._arm.n_sections, 3)
@@ -78,7 +104,7 @@ class SimulatedArm:
         self._advance(self._simulated_to_s, time_s)
         self._simulated_to_s = time_s
         measured_pa = self._valve.pressures_pa + self._noise.next_pa()
-        return Measurement(measured_pa, self._no_lengths, self._rod.tip())
+        return Measurement(measured_pa, self._no_lengths, self._body.tip())
 
     def write(self, pressures_pa: Array, time_s: float) -> Array:
         """Set gauge pressures (n_sections, 3); return the setpoints that the valves took.
@@ -124,4 +150,4 @@ class SimulatedArm:
             end_s = from_s + (to_s - from_s) * (index + 1) / steps
             self._valve.advance(start_s, end_s)
             self._chamber.advance(self._valve.pressures_pa, end_s - start_s)
-            self._rod.step(self._chamber.lengthening_m.reshape(-1), end_s - start_s)
+            self._body.step(self._chamber.lengthening_m.reshape(-1), end_s - start_s)

@@ -1,16 +1,20 @@
-"""The simulated arm as a kind of device."""
+"""The simulated arm as a kind of device, and what every arm that is calculated here has."""
 
+from abc import abstractmethod
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from pydantic import Field
 
 from pneuarm.controllers.arm.arm import Arm, uncalibrated
 from pneuarm.hardware.device import Address, Device, InMemory
 from pneuarm.hardware.interface import Hardware
-from pneuarm.hardware.simulator.parameters import NOMINAL, Valves, draw
+from pneuarm.hardware.simulator.parameters import NOMINAL, SimulatorParameters, Valves, draw
 from pneuarm.hardware.tables.arm import ArmConfig
 from pneuarm.hardware.tables.table import Table
+
+if TYPE_CHECKING:
+    from pneuarm.hardware.simulator.adapter import MakeBody
 
 
 class SimulatorConfig(Table):
@@ -52,34 +56,56 @@ def simulated_arm(config: SimulatorConfig, arm: Arm) -> Arm:
     return replace(body, sections=tuple(uncalibrated(section) for section in body.sections))
 
 
-def drawn_parameters(config: SimulatorConfig, arm: Arm) -> dict[str, float]:
-    """Return the seed and every parameter that is drawn from it, to repeat a run."""
-    drawn = draw(NOMINAL[config.valves], config.seed, arm.n_sections).as_dict()
-    del drawn["lowest_mode_hz"]  # follows from the others, and is known once the rod is built
-    return drawn
+Config = TypeVar("Config", bound=SimulatorConfig)
 
 
-class Simulator(Device[SimulatorConfig]):
-    """An arm of air and mass in this machine's memory."""
+class SimulatedDevice(Device[Config]):
+    """An arm in this machine's memory: it never waits, and its true tip is known."""
+
+    never_waits = True
+
+    def nominal(self, config: Config) -> SimulatorParameters:
+        """Return the nominal arm of the family, from which the seed draws."""
+        return NOMINAL[config.valves]
+
+    @abstractmethod
+    def body(self, config: Config) -> "MakeBody":
+        """Return what makes the body that valves and chambers move."""
+
+    def build(self, config: Config, arm: Arm) -> Hardware:
+        """Make the arm of the seed."""
+        from pneuarm.hardware.simulator.adapter import SimulatedArm
+
+        body = self.body(config)
+        return SimulatedArm(simulated_arm(config, arm), self.nominal(config), config.seed, body)
+
+    def drawn_parameters(self, config: Config, arm: Arm) -> dict[str, float]:
+        """Return the seed and every parameter that is drawn from it, to repeat a run."""
+        drawn = draw(self.nominal(config), config.seed, arm.n_sections).as_dict()
+        del drawn["lowest_mode_hz"]  # follows from the others, and is known once the body is built
+        return drawn
+
+    def address(self, config: Config) -> Address:
+        """Return that each daemon makes its own."""
+        return InMemory()
+
+    def left_behind(self, config: Config) -> str:
+        """Nothing: when its host ends, its air is gone."""
+        return ""
+
+
+class Simulator(SimulatedDevice[SimulatorConfig]):
+    """The arm whose body is a lumped rod of this project's own."""
 
     name = "simulator"
     summary = "the simulated arm"
     config = SimulatorConfig
-    never_waits = True
 
-    def build(self, config: SimulatorConfig, arm: Arm) -> Hardware:
-        """Make the arm of the seed."""
-        from pneuarm.hardware.simulator.adapter import SimulatedArm
+    def body(self, config: SimulatorConfig) -> "MakeBody":
+        """Return the rod."""
+        from pneuarm.hardware.simulator.rod import Rod
 
-        return SimulatedArm(simulated_arm(config, arm), NOMINAL[config.valves], config.seed)
-
-    def address(self, config: SimulatorConfig) -> Address:
-        """Return that each daemon makes its own."""
-        return InMemory()
-
-    def left_behind(self, config: SimulatorConfig) -> str:
-        """Nothing: when its host ends, its air is gone."""
-        return ""
+        return Rod
 
 
 DEVICE = Simulator()

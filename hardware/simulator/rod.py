@@ -10,18 +10,16 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from pneuarm.controllers.arm.arm import CHAMBER_ANGLES_RAD, Arm, Array
-from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.hardware.simulator.chain import Chain
 from pneuarm.hardware.simulator.parameters import DrawnParameters, SimulatorParameters
 from pneuarm.hardware.simulator.statics import (
     LoadedChain,
+    beam_stiffness,
     equilibrium,
     lowest_mode,
     stiffness_for_mode,
+    swing,
 )
-
-#: First frequency of a clamped beam over sqrt(EI / (m L^3)): where the search for EI starts.
-_BEAM_FREQUENCY = 3.516
 
 
 class Rod:
@@ -41,8 +39,10 @@ class Rod:
         self._force_per_lengthening = nominal.stiffness[:, None] * _shape_shift(
             arm, drawn.values.segments_per_section
         )
-        self.lowest_mode_hz, self._damping_time_s = _swing(
-            self.loaded, self._equilibrium, drawn.values.damping_ratio
+        self.lowest_mode_hz, self._damping_time_s = swing(
+            *lowest_mode(self.loaded, self._equilibrium),
+            self.loaded.stiffness,
+            drawn.values.damping_ratio,
         )
         self._mass = np.zeros((chain.n_segments * 3,) * 2)
         self._mass_diagonal = self._mass.reshape(-1)[:: chain.n_segments * 3 + 1]
@@ -79,25 +79,11 @@ class Rod:
         return positions[-1].copy(), rotation.copy()
 
 
-def _swing(loaded: LoadedChain, shapes: Array, damping_ratio: float) -> tuple[float, float]:
-    """Lowest mode (Hz) and the time (s) by which stiffness gives damping of the wanted ratio."""
-    square, mode = lowest_mode(loaded, shapes)
-    if square <= 0.0:
-        raise InvalidInput(
-            f"the drawn simulated arm falls over under its gravity (squared frequency {square:g} "
-            "rad^2/s^2, which must be above 0): raise lowest_mode_hz"
-        )
-    frequency = np.sqrt(square)
-    damping_time_s = 2.0 * damping_ratio * frequency / (loaded.stiffness @ mode**2)
-    return float(frequency / (2.0 * np.pi)), float(damping_time_s)
-
-
 def _nominal_chain(arm: Arm, chain: Chain, nominal: SimulatorParameters) -> LoadedChain:
     """Return the chain of the nominal arm, as stiff as its lowest mode asks for."""
     length = arm.total_rest_length_m
     mass = nominal.mass_per_length_kg_m * length + 2.0 * nominal.plate_mass_kg
-    frequency = 2.0 * np.pi * nominal.lowest_mode_hz
-    guess = mass * length**3 * (frequency / _BEAM_FREQUENCY) ** 2
+    guess = beam_stiffness(mass, length, nominal.lowest_mode_hz)
     straight = _loaded_chain(arm, chain, nominal, np.ones(arm.n_sections))
 
     def of_stiffness(bending: float) -> LoadedChain:

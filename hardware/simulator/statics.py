@@ -13,7 +13,7 @@ from pneuarm.hardware.simulator.chain import Chain
 _LARGEST_STEP_RAD = 0.2
 _NEWTON_STEPS = 60
 #: Beyond this an equilibrium is none of an arm: the equations even turn a soft one inside out.
-_LARGEST_STRAIN = 0.5
+LARGEST_STRAIN = 0.5
 #: Generalised forces (N and N m) below this share of the arm's largest stiffness are rest.
 _REST = 1e-12
 #: Half step of the central difference of gravity's force (m and rad).
@@ -22,6 +22,47 @@ _DIFFERENCE = 1e-5
 _BRACKET_STEPS = 20
 _SEARCH_STEPS = 60
 _MODE_TOLERANCE = 1e-6
+#: First frequency of a clamped beam over sqrt(EI / (m L^3)): where the search for EI starts.
+_BEAM_FREQUENCY = 3.516
+
+
+def too_soft() -> InvalidInput:
+    """Return what is said of an arm for which no rest is found."""
+    return InvalidInput(
+        "the simulated arm is too soft to hold itself: its own weight changes its length by more "
+        f"than {LARGEST_STRAIN:.0%}, or it finds no rest; raise lowest_mode_hz"
+    )
+
+
+def no_stiffness(mode_hz: float) -> InvalidInput:
+    """Return what is said of a mode that no arm has."""
+    return InvalidInput(
+        f"lowest_mode_hz = {mode_hz:g}: no stiffness gives the simulated arm this mode; "
+        "1.5 to 3 Hz is what it is made for"
+    )
+
+
+def beam_stiffness(mass_kg: float, length_m: float, mode_hz: float) -> float:
+    """Bending stiffness EI (N m^2) with which a clamped beam has the mode: a guess for an arm's."""
+    return mass_kg * length_m**3 * (2.0 * np.pi * mode_hz / _BEAM_FREQUENCY) ** 2
+
+
+def swing(
+    square: float, mode: Array, stiffness: Array, damping_ratio: float
+) -> tuple[float, float]:
+    """Lowest mode (Hz) and the time (s) by which stiffness gives damping of the wanted ratio.
+
+    ``square`` (rad^2/s^2) and ``mode`` (n,), mass-normalised, are the mode's, ``stiffness`` (n,)
+    the springs'. Raises InvalidInput for a mode that is none: the arm falls.
+    """
+    if square <= 0.0:
+        raise InvalidInput(
+            f"the drawn simulated arm falls over under its gravity (squared frequency {square:g} "
+            "rad^2/s^2, which must be above 0): raise lowest_mode_hz"
+        )
+    frequency = np.sqrt(square)
+    damping_time_s = 2.0 * damping_ratio * frequency / (stiffness @ mode**2)
+    return float(frequency / (2.0 * np.pi)), float(damping_time_s)
 
 
 @dataclass(frozen=True)
@@ -70,12 +111,9 @@ def equilibrium(loaded: LoadedChain) -> Array:
             return shapes
         step = np.linalg.solve(loaded.stiffness_matrix(shapes), force)
         shapes = shapes + step * min(1.0, _LARGEST_STEP_RAD / np.abs(step).max())
-        if np.abs(shapes[::3] / loaded.rest[::3] - 1.0).max() > _LARGEST_STRAIN:
+        if np.abs(shapes[::3] / loaded.rest[::3] - 1.0).max() > LARGEST_STRAIN:
             break
-    raise InvalidInput(
-        "the simulated arm is too soft to hold itself: its own weight changes its length by more "
-        f"than {_LARGEST_STRAIN:.0%}, or it finds no rest; raise lowest_mode_hz"
-    )
+    raise too_soft()
 
 
 def lowest_mode(loaded: LoadedChain, shapes: Array) -> tuple[float, Array]:
@@ -110,10 +148,7 @@ def stiffness_for_mode(
                 return found
             break
         low, low_excess = high, high_excess
-    raise InvalidInput(
-        f"lowest_mode_hz = {mode_hz:g}: no stiffness gives the simulated arm this mode; "
-        "1.5 to 3 Hz is what it is made for"
-    )
+    raise no_stiffness(mode_hz)
 
 
 def _square_at_rest(loaded: LoadedChain) -> float:

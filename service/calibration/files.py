@@ -13,7 +13,6 @@ from pneuarm.controllers.calibration.calibrate import Calibration
 from pneuarm.controllers.calibration.frames import Frames
 from pneuarm.controllers.geometry.mountings import Transform
 from pneuarm.controllers.geometry.rotations import rotation_vector
-from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.tables.table import BAR, DEG, MM
 from pneuarm.service.calibration.values import residuals_text, value_text, values, worth_text
 from pneuarm.service.configuration.configuration import Configuration, check
@@ -28,11 +27,11 @@ _DIGITS = 7
 def calibrated(configuration: Configuration, calibration: Calibration) -> Configuration:
     """Return the configuration with the fitted values, and with the frames if they were fitted.
 
-    A simulated arm stays what it was: the simulator goes on with the arm from before.
+    A simulated arm stays what it was: its device goes on with the arm from before.
     """
     tables = configuration.model_dump(exclude_none=True)
-    if configuration.is_simulated and configuration.simulator.arm is None:
-        tables[SIMULATOR.table]["arm"] = configuration.arm.model_dump()
+    if configuration.is_simulated and configuration.simulated.arm is None:
+        tables[configuration.device.table]["arm"] = configuration.arm.model_dump()
     sections = zip(tables["arm"]["sections"], calibration.arm.sections, strict=True)
     tables["arm"]["sections"] = [old | _section(section) for old, section in sections]
     tables["arm"]["response"] = _response(calibration.arm.response)

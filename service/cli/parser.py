@@ -122,9 +122,9 @@ def _add_emulated_devices(commands: Subparsers) -> None:
 
 def _add_adapter(demo: Parser) -> None:
     from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
-    from pneuarm.service.configuration.devices import emulated_devices
+    from pneuarm.service.configuration.devices import shown_devices
 
-    names = (SIMULATOR.name, *(device.name for device in emulated_devices()))
+    names = [device.name for device in shown_devices()]
     demo.add_argument("--adapter", choices=names, default=SIMULATOR.name)
     _add_valves(demo, "servo", "servo")
 

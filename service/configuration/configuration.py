@@ -22,7 +22,7 @@ from pneuarm.controllers.arm.errors import ConfigurationError, InvalidInput
 from pneuarm.controllers.limits.limits import refuse_contradictions
 from pneuarm.hardware.device import Device
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
-from pneuarm.hardware.simulator.device import SimulatorConfig, simulated_arm
+from pneuarm.hardware.simulator.device import SimulatedDevice, SimulatorConfig, simulated_arm
 from pneuarm.hardware.tables.arm import ArmConfig
 from pneuarm.hardware.tables.table import Table
 from pneuarm.logs.schema.printable import printable
@@ -64,10 +64,11 @@ class _Configuration(Table):
 
     @model_validator(mode="after")
     def _simulated_as_controlled(self) -> "_Configuration":
-        there, here = len((self.simulator.arm or self.arm).sections), len(self.arm.sections)
+        there, here = len((self.simulated.arm or self.arm).sections), len(self.arm.sections)
         if there != here:
+            table = (self.device if self.is_simulated else SIMULATOR).table
             raise ValueError(
-                f"simulator.arm has {there} sections, arm has {here}; the numbers must be equal"
+                f"{table}.arm has {there} sections, arm has {here}; the numbers must be equal"
             )
         return self
 
@@ -89,8 +90,8 @@ class _Configuration(Table):
         return replace(self.arm.build(), tool_m=self.frames.tool_m())
 
     def build_simulated_arm(self) -> Arm:
-        """Return the arm behind the simulator and every emulator: ``arm``, or ``simulator.arm``."""
-        return simulated_arm(self.simulator, self.arm.build())
+        """Return the arm that is calculated here: ``arm``, or the one of the table `simulated`."""
+        return simulated_arm(self.simulated, self.arm.build())
 
     @property
     def device(self) -> AnyDevice:
@@ -100,7 +101,12 @@ class _Configuration(Table):
     @property
     def is_simulated(self) -> bool:
         """Whether the arm itself is calculated here, so that its true tip is known."""
-        return self.device is SIMULATOR
+        return isinstance(self.device, SimulatedDevice)
+
+    @property
+    def simulated(self) -> SimulatorConfig:
+        """The table of the arm that is calculated here, as the device or behind an emulated one."""
+        return self.of_device(self.device) if self.is_simulated else self.simulator
 
     def of_device(self, device: Device[DeviceConfig]) -> DeviceConfig:
         """Return the table of a kind of device, whether it is used or not."""

@@ -21,6 +21,7 @@ import pneuarm.hardware
 import pneuarm.logs
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.hardware.device import Device, EmulatedDevice
+from pneuarm.hardware.simulator.device import SimulatedDevice
 from pneuarm.hardware.tables.table import Table
 
 GROUP = "pneuarm.devices"
@@ -87,6 +88,12 @@ def devices() -> Devices:
 def emulated_devices() -> list[EmulatedDevice[Any]]:
     """Return those that can be emulated."""
     return [device for device in devices().usable.values() if isinstance(device, EmulatedDevice)]
+
+
+def shown_devices() -> list[AnyDevice]:
+    """Return those that a demo can show: simulated, or emulated."""
+    kinds = (SimulatedDevice, EmulatedDevice)
+    return [device for device in devices().usable.values() if isinstance(device, kinds)]
 
 
 def _own() -> Iterator[AnyDevice]:

@@ -26,8 +26,8 @@ def start_facts(shared: Shared, realtime: str) -> list[str]:
     sections = len(arm.sections)
     device = backends.address(configuration)
     if configuration.is_simulated:
-        simulator = configuration.simulator
-        device += f", seed {simulator.seed}, {simulator.valves} valves"
+        simulated = configuration.simulated
+        device += f", seed {simulated.seed}, {simulated.valves} valves"
     lines = [
         f"arm        {arm.name}: {sections} section{'s' * (sections > 1)}, {3 * sections} chambers",
         f"adapter    {configuration.hardware.adapter} (device {device})",

@@ -4,7 +4,7 @@ import platform
 from importlib.metadata import version
 
 from pneuarm.controllers.arm.arm import Arm
-from pneuarm.hardware.simulator.device import drawn_parameters
+from pneuarm.hardware.simulator.device import SimulatedDevice
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration
 
@@ -22,6 +22,7 @@ _PACKAGES = (
 
 def info_of(configuration: Configuration, arm: Arm, log_path: str) -> pb.Info:
     """Configuration, limits and versions."""
+    device = configuration.device
     versions = {name: version(name) for name in _PACKAGES}
     versions["python"] = platform.python_version()
     return pb.Info(
@@ -35,7 +36,7 @@ def info_of(configuration: Configuration, arm: Arm, log_path: str) -> pb.Info:
         versions=versions,
         log_path=log_path,
         rate_hz=configuration.control.rate_hz,
-        simulator=drawn_parameters(configuration.simulator, arm)
-        if configuration.is_simulated
+        simulator=device.drawn_parameters(configuration.simulated, arm)
+        if isinstance(device, SimulatedDevice)
         else {},
     )

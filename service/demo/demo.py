@@ -45,7 +45,7 @@ def demo(arguments: argparse.Namespace) -> int:
 
 def _laid_over(arguments: argparse.Namespace, device: dict[str, object]) -> dict[str, object]:
     laid = load(preset=arguments.arm).model_dump(exclude_none=True)
-    for above in (device, tables(arguments.seed, arguments.valves)):
+    for above in (device, tables()):
         for name, value in above.items():
             laid[name] = laid[name] | value if isinstance(value, dict) else value
     return laid

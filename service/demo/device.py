@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pneuarm.controllers.arm.errors import InvalidInput, PneuarmError
 from pneuarm.hardware.device import EmulatedDevice
-from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
+from pneuarm.hardware.simulator.device import SimulatedDevice
 from pneuarm.service.configuration.devices import devices
 from pneuarm.service.devices.registry import fitting
 from pneuarm.service.emulators.command import LAST_LINE
@@ -20,11 +20,13 @@ from pneuarm.service.emulators.command import LAST_LINE
 def emulated(adapter: str, arm: str, seed: int, valves: str) -> Iterator[dict[str, object]]:
     """Run an emulator while the context lasts; yields its tables of the configuration.
 
-    A simulated arm needs none. Raises PneuarmError where the emulator does not start.
+    A simulated arm needs none. Raises PneuarmError where the emulator does not start, and
+    NotInstalled where a package is missing.
     """
     device = devices().named(adapter)
-    if device is SIMULATOR:
-        yield {}
+    device.require()
+    if isinstance(device, SimulatedDevice):
+        yield {"hardware": {"adapter": adapter}, device.table: {"seed": seed, "valves": valves}}
         return
     if not isinstance(device, EmulatedDevice):
         raise InvalidInput(f"--adapter {adapter}: this device has no emulator to show")

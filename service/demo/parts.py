@@ -5,7 +5,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 
@@ -21,14 +20,13 @@ class DemoPart:
     seconds: dict[str, float]
 
 
-def tables(seed: int, valves: str) -> dict[str, object]:
+def tables() -> dict[str, object]:
     """Tables of the configuration that every part shares: free ports, one Rerun recording.
 
     The client of a show may be late on a busy machine: nobody stands beside the arm.
     """
     return {
         "control": {"target_timeout_ms": 2000.0},
-        SIMULATOR.table: {"seed": seed, "valves": valves},
         "zenoh": {"listen": [f"tcp/127.0.0.1:{_free_port()}"]},
         "rerun": {"port": _free_port(), "start_server": False, "recording": "pneuarm-demo"},
     }

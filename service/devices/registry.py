@@ -12,14 +12,17 @@ from pneuarm.service.configuration.devices import AnyDevice, devices
 def build(configuration: Configuration, arm: Arm) -> Hardware:
     """Make the device that the configuration names; it is not connected yet.
 
-    Raises ConfigurationError where it cannot be wired to the arm as configured.
+    Raises ConfigurationError where it cannot be wired to the arm as configured, and NotInstalled
+    where a package is missing that it needs.
     """
     device = configuration.device
+    device.require()
     return device.build(configuration.of_device(device), arm)
 
 
 def check(configuration: Configuration) -> None:
-    """Raise ConfigurationError for a device that may not be started; touches none."""
+    """Raise ConfigurationError or NotInstalled where a device may not be started; touches none."""
+    configuration.device.require()
     if not in_control(configuration):
         build(configuration, configuration.build_arm())
     left_behind = _left_behind(configuration)

@@ -49,7 +49,7 @@ def _emulated_arm(arguments: argparse.Namespace, configuration: Configuration) -
         record = None if arguments.record is None else DeviceRecord(arguments.record)
     except OSError as error:
         raise InvalidInput(f"--record {arguments.record}: {error.strerror}") from error
-    nominal = NOMINAL[arguments.valves or configuration.simulator.valves]
+    nominal = NOMINAL[arguments.valves or configuration.simulated.valves]
     return EmulatedArm(configuration.build_simulated_arm(), arguments.seed, record, nominal)
 
 

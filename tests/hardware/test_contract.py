@@ -16,6 +16,7 @@ from pneuarm.hardware.esp32.protocol import STEP_PA as ESP32_STEP_PA
 from pneuarm.hardware.festo.counts import COUNT_PA
 from pneuarm.hardware.festo_cpx.device import DEVICE as FESTO_CPX
 from pneuarm.hardware.festo_vtem.device import DEVICE as FESTO_VTEM
+from pneuarm.hardware.mujoco.device import DEVICE as MUJOCO
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.logs.reading.device import DEVICE as REPLAY
 from pneuarm.service.devices import registry
@@ -43,6 +44,12 @@ class TestSimulator(DeviceContract):
 
         bench.told_pa = told_pa
         yield bench
+
+
+class TestMujoco(TestSimulator):
+    """The same air, and another body."""
+
+    device = MUJOCO
 
 
 class TestReplay(DeviceContract):

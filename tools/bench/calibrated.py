@@ -19,20 +19,16 @@ from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.kinematics.constant_curvature import tip_transform
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import PositionTarget
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.simulator.parameters import NOMINAL, Valves
 from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 from tools.rig.arms import random_lengths
-from tools.rig.simulated import Bench, configuration_of
+from tools.rig.simulated import Bench, add_world, configuration_of
 
 RATE_HZ = 250.0
 #: Targets: how much of the way to each limit, how many, how long, averaged over what.
 SHARE, TARGETS, SECONDS, AVERAGED_S = 0.5, 15, 3.0, 0.4
-
-
-def calibrated_arm(preset: str, seed: int, valves: Valves = "servo") -> Configuration:
-    """Calibrate a simulated arm; the configuration holds the result, and still simulates it."""
-    return calibrate_simulated(configuration_of(preset, RATE_HZ, seed, valves))
 
 
 def tip_errors_percent(configuration: Configuration, targets: Array) -> Array:
@@ -68,12 +64,17 @@ def targets_of(preset: str, seed: int, number: int = TARGETS) -> Array:
 
 
 def measure(
-    preset: str, seed: int, number: int = TARGETS, valves: Valves = "servo"
+    preset: str,
+    seed: int,
+    number: int = TARGETS,
+    valves: Valves = "servo",
+    world: str = SIMULATOR.name,
 ) -> dict[str, Any]:
     """Errors of one arm of the family, before and after."""
     targets = targets_of(preset, seed, number)
-    before = tip_errors_percent(configuration_of(preset, RATE_HZ, seed, valves), targets)
-    after = tip_errors_percent(calibrated_arm(preset, seed, valves), targets)
+    nominal = configuration_of(preset, RATE_HZ, seed, valves, world)
+    before = tip_errors_percent(nominal, targets)
+    after = tip_errors_percent(calibrate_simulated(nominal), targets)
     both = np.isfinite(before) & np.isfinite(after)
     before, after = before[both], after[both]
     return {
@@ -92,17 +93,18 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10, help="arms of the family (default 10)")
     parser.add_argument("--valves", choices=tuple(NOMINAL), default="servo")
     parser.add_argument("--json", action="store_true")
+    add_world(parser)
     arguments = parser.parse_args()
     rows = []
     if not arguments.json:
         print("seed  before mean, max %   after mean, max %   times smaller")
     for seed in range(arguments.seeds):
-        rows.append(measure(arguments.preset, seed, valves=arguments.valves))
+        rows.append(measure(arguments.preset, seed, valves=arguments.valves, world=arguments.world))
         if not arguments.json:
             print(_line(rows[-1]), flush=True)
     worst = max(rows, key=lambda row: row["after_percent"]["mean"])
     if arguments.json:
-        told = {"preset": arguments.preset, "valves": arguments.valves}
+        told = {"preset": arguments.preset, "valves": arguments.valves, "world": arguments.world}
         print(json.dumps({**told, "rows": rows, "worst": worst}))
     else:
         print(f"worst: seed {worst['seed']}, mean {worst['after_percent']['mean']:.2f} %")

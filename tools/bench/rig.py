@@ -78,7 +78,7 @@ class CameraRig:
         self.camera = camera
         self._camera_ns, self._next_ns = round(1e9 / camera_hz), self.now_ns
         self._delay_ns, self._noise_m = round(delay_s * 1e9), noise_m
-        self._rng = np.random.default_rng([configuration.simulator.seed, 7])
+        self._rng = np.random.default_rng([configuration.simulated.seed, 7])
         self._on_the_way: deque[tuple[int, Array, Array]] = deque()
         self._records: list[bytes] = []
         self._target: Target | None = None

@@ -5,7 +5,8 @@
 Every figure is of the true tip. The camera takes 100 poses a second, which arrive 10 ms late with
 0.1 mm of noise on every axis. Each seed is another arm of the family; the calibrated one has what
 `pneuarm calibrate` fits to that very arm, its response too. The seeds from 10 on are none of those
-with which the constants of reference and correction were chosen.
+with which the constants of reference and correction were chosen; `--world mujoco` is another
+simulator than that.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from pneuarm.service.calibration.simulated import calibrate_simulated
 from pneuarm.service.configuration.configuration import Configuration
 from tools.bench.calibrated import targets_of
 from tools.bench.rig import CameraRig
-from tools.rig.simulated import configuration_of
+from tools.rig.simulated import add_world, configuration_of
 
 Row = dict[str, Any]
 
@@ -104,7 +105,7 @@ def camera_lost(rig: CameraRig) -> dict[str, dict[str, float]]:
 
 def measure(configuration: Configuration, camera: bool, targets: int) -> Row:
     """All figures of one arm."""
-    seed = configuration.simulator.seed
+    seed = configuration.simulated.seed
     rig = CameraRig(configuration, camera=camera).activate()
     rig.to(HOME, STEP_S)
     row: Row = {
@@ -165,7 +166,7 @@ def _measured(name: str, arms: list[Configuration], camera: bool, targets: int) 
 
 
 def _calibrated(arm: Configuration) -> Configuration:
-    print("calibrating seed", arm.simulator.seed, file=sys.stderr, flush=True)
+    print("calibrating seed", arm.simulated.seed, file=sys.stderr, flush=True)
     return calibrate_simulated(arm)
 
 
@@ -177,14 +178,19 @@ def main() -> None:
     parser.add_argument("--targets", type=int, default=50, help="for each seed (default 50)")
     parser.add_argument("--valves", choices=tuple(NOMINAL), default="servo")
     parser.add_argument("--alone", action="store_true", help="only calibrated and with the camera")
+    add_world(parser)
     arguments = parser.parse_args()
-    arms = [configuration_of("paper", RATE_HZ, seed, arguments.valves) for seed in arguments.seeds]
+    arms = [
+        configuration_of("paper", RATE_HZ, seed, arguments.valves, arguments.world)
+        for seed in arguments.seeds
+    ]
     known = [_calibrated(arm) for arm in arms]
     few = max(1, arguments.targets // 5)
     found: Row = {
         "seeds": arguments.seeds,
         "rate_hz": RATE_HZ,
         "valves": arguments.valves,
+        "world": arguments.world,
     }
     found["calibrated"] = _measured("calibrated", known, True, arguments.targets)
     if not arguments.alone:

@@ -1,5 +1,6 @@
 """The control loop on simulated time: no clock, no sleeping, every write to the device seen."""
 
+from argparse import ArgumentParser
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import inf
@@ -9,11 +10,14 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.targets.targets import Target
 from pneuarm.hardware.interface import Hardware, Measurement
+from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
+from pneuarm.hardware.simulator.device import SimulatedDevice
 from pneuarm.hardware.simulator.parameters import Valves
 from pneuarm.logs.rings.status import Disk
 from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.configuration.configuration import Configuration, load
+from pneuarm.service.configuration.devices import devices
 from pneuarm.service.control.loop import Loop, LoopSettings, Timing
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.modes.mode import Mode, ModeEvent
@@ -69,12 +73,28 @@ class Watched:
 
 
 def configuration_of(
-    preset: str = "paper", rate_hz: float = 500.0, seed: int = 0, valves: Valves = "servo"
+    preset: str = "paper",
+    rate_hz: float = 500.0,
+    seed: int = 0,
+    valves: Valves = "servo",
+    world: str = SIMULATOR.name,
 ) -> Configuration:
+    """A built-in arm at a rate, simulated in a world: the name of a device that simulates."""
     whole = load(preset=preset)
-    control = whole.control.model_copy(update={"rate_hz": rate_hz})
-    simulator = whole.simulator.model_copy(update={"seed": seed, "valves": valves})
-    return whole.model_copy(update={"control": control, "simulator": simulator})
+    device = devices().named(world)
+    own = whole.of_device(device).model_copy(update={"seed": seed, "valves": valves})
+    tables = {
+        "control": whole.control.model_copy(update={"rate_hz": rate_hz}),
+        "hardware": whole.hardware.model_copy(update={"adapter": world}),
+        device.table: own,
+    }
+    return whole.model_copy(update=tables)
+
+
+def add_world(parser: ArgumentParser) -> None:
+    """Let a command choose the world in which its arms are simulated."""
+    worlds = [d.name for d in devices().usable.values() if isinstance(d, SimulatedDevice)]
+    parser.add_argument("--world", choices=worlds, default=SIMULATOR.name)
 
 
 class Bench:

@@ -298,16 +298,20 @@ def test_a_coupling_without_an_inverse_is_refused(tmp_path: Path) -> None:
     assert "independent" in line
 
 
-def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("table", ["simulator", "mujoco"])
+def test_the_simulated_arm_may_differ_from_the_controlled_one(tmp_path: Path, table: str) -> None:
+    hardware = {"adapter": table}
     real = load().model_dump(exclude_none=True)["arm"]
     believed = real | {"sections": [SECTION | {"rest_length_mm": 210.0}]}
-    own = loaded(tmp_path, tomli_w.dumps({"arm": believed, "simulator": {"arm": real}}))
+    text = tomli_w.dumps({"arm": believed, "hardware": hardware, table: {"arm": real}})
+    own = loaded(tmp_path, text)
     assert own.build_arm().sections[0].rest_length_m == pytest.approx(0.21)
     assert own.build_simulated_arm() == load().build_arm()
     assert loaded(tmp_path, own.to_toml()) == own
     two = real | {"sections": [SECTION, SECTION]}
-    (line,) = refusals(tmp_path, tomli_w.dumps({"simulator": {"arm": two}}))
-    assert re.search(r"simulator\.arm .*2 sections.* arm .*1", line)
+    text = tomli_w.dumps({"hardware": hardware, table: {"arm": two}})
+    (line,) = refusals(tmp_path, text)
+    assert re.search(rf"{table}\.arm .*2 sections.* arm .*1", line)
 
 
 WALL = {"shape": "half_space", "normal": [0.0, 0.0, 2.0], "offset_mm": 320.0}

@@ -29,9 +29,11 @@ def test_every_device_has_an_arm_that_it_can_move(device: AnyDevice) -> None:
     assert (fits == load(preset="paper")) == (not device.demo_section)
 
 
-def test_the_simulator_needs_nothing_beside_it() -> None:
-    with emulated("simulator", "paper", 0, "servo") as tables:
-        assert tables == {}
+@pytest.mark.parametrize("name", ["simulator", "mujoco"])
+def test_a_simulated_arm_needs_no_more_than_its_seed_and_valves(name: str) -> None:
+    with emulated(name, "paper", 7, "itv") as tables:
+        own = {"seed": 7, "valves": "itv"}
+        assert tables == {"hardware": {"adapter": name}, name: own}
 
 
 def test_the_daemon_is_told_of_the_arm_that_its_device_moves() -> None:

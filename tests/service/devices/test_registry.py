@@ -221,7 +221,8 @@ def test_a_device_that_cannot_stand_beside_the_others_is_set_aside(
 
 def test_control_loads_no_device_but_the_simulator_and_no_reader_of_logs() -> None:
     """All kinds of device are known in every process, and cost none of them their libraries."""
-    heavy = ["mcap", "zenoh", "rerun", "pymodbus", "serial", "pneuarm.hardware.simulator.rod"]
+    heavy = ["mcap", "zenoh", "rerun", "pymodbus", "serial", "mujoco"]
+    heavy += ["pneuarm.hardware.simulator.rod"]
     code = (
         "import sys, pneuarm.service.control.process\n"
         "from pneuarm.service.configuration.devices import devices\n"

@@ -6,10 +6,8 @@ from tools.bench import calibrated
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("preset", "seed"), [("paper", 4)])
-def test_a_calibrated_arm_is_three_times_nearer_and_within_three_percent(
-    preset: str, seed: int
-) -> None:
-    row = calibrated.measure(preset, seed, number=4)
+@pytest.mark.parametrize("world", ["simulator", "mujoco"])
+def test_a_calibrated_arm_is_three_times_nearer_and_within_three_percent(world: str) -> None:
+    row = calibrated.measure("paper", 4, number=4, world=world)
     assert row["times_smaller"] > 3.0
     assert row["after_percent"]["mean"] < 3.0

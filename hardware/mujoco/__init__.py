@@ -1,0 +1,1 @@
+"""The simulated arm in MuJoCo: a second body, with twist and contact. Needs `pneuarm[mujoco]`."""
