@@ -31,6 +31,10 @@ _PULL_KEPT_PER_S, _STIFFER = 7.0, 1.05
 _TRIES = 12
 _AGREED_S = 1e-9
 
+#: Below this (m or rad, and that a second and a second squared) a goal is met: with less than
+#: nanometres between them, and of a speed to go with, Ruckig sometimes finds no way.
+_MET = 1e-6
+
 
 @dataclass(frozen=True)
 class ReferenceLimits:
@@ -99,7 +103,7 @@ class Reference:
         request = self._input
         request.current_position, request.current_velocity = now.position, now.velocity
         request.current_acceleration = _clipped(now.acceleration, self._acceleration_max)
-        plan, at_s = Trajectory(self.size), 0.0
+        plan, at_s, met = Trajectory(self.size), 0.0, False
         request.minimum_duration = None
         self.error = ""
         for _ in range(_TRIES):
@@ -110,13 +114,16 @@ class Reference:
             try:
                 self._otg.calculate(request, plan)
             except (RuckigError, ValueError) as error:  # it knows results that have no name
+                met = _is_met(now, goal(0.0))
+                if met:
+                    break
                 self.error = " ".join(str(error).split())
                 return
             if abs(plan.duration - at_s) < _AGREED_S:
                 break
             at_s = plan.duration if aim.velocity == zeros else _SLACK * plan.duration
             request.minimum_duration = at_s
-        self._plan, self._goal, self._streams = plan, goal, False
+        self._plan, self._goal, self._streams = None if met else plan, goal, False
         self._since_s = self._plan_s = self._drawn_per_s = 0.0
 
     def stream(self, goal: Goal) -> None:
@@ -208,6 +215,15 @@ class Reference:
 def _jerk(pull_per_s: float, gap: float, change: float, acceleration: float) -> float:
     """Jerk of a point with three equal poles that lacks a way and a velocity to its goal."""
     return pull_per_s * (pull_per_s * (pull_per_s * gap + 3.0 * change) - 3.0 * acceleration)
+
+
+def _is_met(now: MovingPoint, aim: MovingPoint) -> bool:
+    """Whether only rounding is between a point and its goal; not where either is no number."""
+    return all(
+        abs(a - b) < _MET
+        for have, want in zip(now, aim, strict=True)
+        for a, b in zip(have, want, strict=True)
+    )
 
 
 def _clipped(values: list[float], limits: list[float]) -> list[float]:

@@ -77,6 +77,20 @@ def test_a_goal_that_is_no_number_is_not_taken_and_said() -> None:
     assert motion.position == pytest.approx([0.1, 0.0, 0.0])
 
 
+def test_a_goal_that_only_rounding_is_between_is_met() -> None:
+    rng, reference = np.random.default_rng(0), Reference(LIMITS)
+
+    def tiny() -> np.ndarray:
+        return np.asarray(10.0 ** rng.uniform(-18.0, -8.0, 3) * rng.choice([-1.0, 0.0, 1.0], 3))
+
+    for _ in range(4000):
+        place = rng.uniform(-0.1, 0.2, 3)
+        reference.now = MovingPoint(place.tolist(), tiny().tolist(), tiny().tolist())
+        reference.go(standing((place + tiny()).tolist()))
+        assert reference.error == ""
+        assert reference.step(DT_S).position == pytest.approx(place.tolist(), abs=1e-7)
+
+
 def _shapes() -> list[ShapeTarget]:
     first, second = perpendicular(np.array([0.3, 0.2, 0.9]))
     return [
