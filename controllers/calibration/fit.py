@@ -204,7 +204,8 @@ class _Problem:
     def errors_m(self, x: Array) -> Array:
         """Distances (rests,) of the modelled tips from the measured ones."""
         away = self.frames_at(x).measured_m(self.poses(x)) - self.rests.tip_m
-        distances: Array = np.linalg.norm(away, axis=1)
+        with np.errstate(over="ignore"):  # a wild start has the tip infinitely far off
+            distances: Array = np.linalg.norm(away, axis=1)
         return distances
 
     def angles_rad(self, x: Array) -> Array:
