@@ -13,6 +13,7 @@ from pneuarm.hardware.mujoco.device import DEVICE
 from pneuarm.service.configuration.configuration import Configuration, check, load
 from pneuarm.service.daemon.info import info_of
 from pneuarm.service.devices import registry
+from tests.hardware.simulator.test_simulator import session
 
 BENDING_PA = np.array([[-4e4, 2e4, 3e4]])
 
@@ -26,18 +27,6 @@ def configuration(preset: str = "paper", **table: object) -> Configuration:
 
 def built(whole: Configuration) -> Hardware:
     return registry.build(whole, whole.build_arm())
-
-
-def session(hardware: Hardware, ticks: int = 120) -> bytes:
-    """Everything an arm answers to one fixed sequence of random commands, as bytes."""
-    rng, answers = np.random.default_rng(7), list[Array]()
-    hardware.connect()
-    for tick in range(ticks):
-        reading = hardware.read(3.0 + tick * 2e-3)
-        sent = hardware.write(rng.uniform(-1e5, 1e5, (1, 3)), 3.0 + tick * 2e-3)
-        assert reading.true_tip is not None
-        answers += [reading.pressures_pa, reading.lengths_m, *reading.true_tip, sent]
-    return b"".join(answer.tobytes() for answer in answers)
 
 
 def rested_tip(hardware: Hardware, pressures_pa: Array, seconds: float = 4.0) -> Array:

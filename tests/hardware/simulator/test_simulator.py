@@ -48,7 +48,7 @@ def tips(simulated: SimulatedArm, times_s: Iterable[float]) -> Array:
     return np.array(positions)
 
 
-def session(simulated: SimulatedArm, ticks: int = 120) -> bytes:
+def session(simulated: Hardware, ticks: int = 120) -> bytes:
     """Everything an arm answers to one fixed sequence of random commands, as bytes."""
     rng, answers = np.random.default_rng(7), []
     simulated.connect()
