@@ -76,9 +76,11 @@ def test_second_client_is_refused_with_the_holders_name(daemon: Daemon, watcher:
         for refused in (watcher.enable, watcher.take_lease):
             with pytest.raises(LeaseRefused, match=f"{first.client_id} holds the arm"):
                 refused()
-        watcher.send_position((0.0, 0.0, 0.2))
         with pytest.raises(TargetRejected, match="has no lease"):
-            wait_for(lambda: watcher.raise_if_refused(), "the rejection")
+            wait_for(
+                lambda: watcher.send_position((0.0, 0.0, 0.2)) and watcher.raise_if_refused(),
+                "the rejection",
+            )
         keep_moving(first, enough(0.2), "the first client goes on")
 
 
