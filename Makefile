@@ -8,7 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup docs demo faults damage mutants test test-slow test-lowest check validate bench-setup proto lock clean bench
+.PHONY: setup docs demo faults damage mutants soak test test-slow test-lowest check validate bench-setup proto lock clean bench
 
 setup: $(READY)
 
@@ -35,6 +35,11 @@ mutants: setup
 # Logs of several kinds, damaged at random; says what was lost, or that nothing was.
 damage: setup
 	$(BIN)/python -m tools.logs.damage --times $(DAMAGES)
+
+# A daemon for an hour beside a busy process: what grows, and is a tick lost?
+MINUTES ?= 60
+soak: setup
+	$(BIN)/python -m tools.soak --minutes $(MINUTES)
 
 # Two workers: processes that need their time on one, everything else on the other.
 test: check
