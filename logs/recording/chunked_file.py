@@ -66,6 +66,26 @@ class _Open:
     index: dict[int, list[int]] = field(default_factory=dict)  # time, offset, time, offset...
 
 
+class _Indexes:
+    """The index of every chunk, as it will stand in the summary; small, for days of recording."""
+
+    def __init__(self) -> None:
+        self._zlib, self._packed = zlib.compressobj(1), bytearray()
+        self.number = self.start_ns = self.end_ns = 0
+
+    def add(self, index: ChunkIndex) -> None:
+        """Take the next one."""
+        self._packed += self._zlib.compress(to_bytes(index))
+        first, last = index.message_start_time, index.message_end_time
+        self.start_ns = min(self.start_ns, first) if self.number else first
+        self.end_ns = max(self.end_ns, last)
+        self.number += 1
+
+    def end(self) -> bytes:
+        """Return them all, once."""
+        return zlib.decompress(bytes(self._packed) + self._zlib.flush())
+
+
 class ChunkedFile:
     """Writes one MCAP file: chunks with their channels, indexes, and a checksummed summary."""
 
@@ -75,7 +95,7 @@ class ChunkedFile:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._written_schemas: set[int] = set()
-        self._chunk_indexes: list[ChunkIndex] = []
+        self._chunk_indexes = _Indexes()
         self._metadata_indexes: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}
         self._open = _Open()
@@ -148,7 +168,7 @@ class ChunkedFile:
             self._write(record)
             at += len(record)
             self._counts[channel] = self._counts.get(channel, 0) + len(entries) // 2
-        self._chunk_indexes.append(
+        self._chunk_indexes.add(
             ChunkIndex(
                 message_start_time=chunk.message_start_time,
                 message_end_time=chunk.message_end_time,
@@ -181,16 +201,15 @@ class ChunkedFile:
         self.end_chunk(compress=True)
         self._output.write(to_bytes(DataEnd(self._data_crc)))
         start = self._output.tell()
-        groups: list[tuple[Opcode, list[McapRecord]]] = [
-            (Opcode.SCHEMA, list(self._schemas.values())),
-            (Opcode.CHANNEL, list(self._channels.values())),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, list(self._chunk_indexes)),
-            (Opcode.METADATA_INDEX, list(self._metadata_indexes)),
+        groups: list[tuple[Opcode, bytes]] = [
+            (Opcode.SCHEMA, to_bytes(*self._schemas.values())),
+            (Opcode.CHANNEL, to_bytes(*self._channels.values())),
+            (Opcode.STATISTICS, to_bytes(self._statistics())),
+            (Opcode.CHUNK_INDEX, self._chunk_indexes.end()),
+            (Opcode.METADATA_INDEX, to_bytes(*self._metadata_indexes)),
         ]
         summary, offsets = b"", []
-        for opcode, records in groups:
-            data = to_bytes(*records)
+        for opcode, data in groups:
             if data:
                 offsets.append(
                     SummaryOffset(
@@ -208,15 +227,15 @@ class ChunkedFile:
         self._output.write(summary + to_bytes(footer) + MCAP0_MAGIC)
 
     def _statistics(self) -> Statistics:
-        indexes = self._chunk_indexes
+        chunks = self._chunk_indexes
         return Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=len(indexes),
+            chunk_count=chunks.number,
             message_count=sum(self._counts.values()),
-            message_end_time=max((index.message_end_time for index in indexes), default=0),
-            message_start_time=min((index.message_start_time for index in indexes), default=0),
+            message_end_time=chunks.end_ns,
+            message_start_time=chunks.start_ns,
             metadata_count=len(self._metadata_indexes),
             schema_count=len(self._schemas),
         )
