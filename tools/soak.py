@@ -12,6 +12,7 @@ import argparse
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -53,6 +54,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
     minutes: float = parser.parse_args().minutes
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # leave no process behind
     with tempfile.TemporaryDirectory(prefix="pneuarm-soak-") as folder:
         tables = {"rerun": {"enabled": True}, "feedback": {"enabled": True}}
         daemon = Daemon(Path(folder), tables)
@@ -135,7 +137,7 @@ def _watch(daemon: Daemon, minutes: float) -> Iterator[tuple[float, dict[str, Us
             flush=True,
         )
         yield now_s, uses
-        time.sleep(60.0)
+        time.sleep(min(60.0, max(0.0, 60.0 * minutes - now_s) + 1.0))
 
 
 def _growth(name: str, uses: list[tuple[float, dict[str, Use]]]) -> Iterator[str]:
