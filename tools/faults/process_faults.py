@@ -5,6 +5,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -16,7 +17,21 @@ from tools.faults.injection import Injection
 from tools.faults.rig import Rig
 from tools.rig.daemon import enough
 
+#: The wait before a restart doubles from one to the next, to this at most (s); a process that has
+#: lived so long is started again at once.
+_REVIVED_S, _LIVED_S = 30.0, 6.0
+
 _VIEWED = {"rerun": {"enabled": True, "memory_limit_mib": 32}}
+
+
+def _grown_up(rig: Rig, name: str) -> int:
+    """Return the number of a process once it has lived long enough to be started again soon."""
+    pid = rig.pid(name)
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    begun_s = int(fields[19]) / os.sysconf("SC_CLK_TCK")
+    lived_s = time.clock_gettime(time.CLOCK_BOOTTIME) - begun_s
+    rig.wait_until(enough(_LIVED_S - lived_s), f"a {name} that has lived for long enough")
+    return pid
 
 
 def _control(number: int) -> Callable[[Rig, Injection], None]:
@@ -52,12 +67,12 @@ def _device(number: int) -> Callable[[Rig, Injection], None]:
     """Control goes on without its device: fault; the supervisor zeroes it, and starts another."""
 
     def inject(rig: Rig, injection: Injection) -> None:
-        device = rig.pid("device")
+        device = _grown_up(rig, "device")
         injection.must_reach(pb.FAULT, within_s=0.6)
         injection.zero_within_s = ZERO_S
         injection.begin()
         os.kill(device, number)
-        rig.wait_until(lambda: rig.pid("device") != device, "another device process")
+        rig.wait_until(lambda: rig.pid("device") != device, "another device process", _REVIVED_S)
         rig.wait_for_mode(pb.FAULT)
         rig.wait_until_empty()
 
@@ -85,11 +100,11 @@ def _all_killed(rig: Rig, injection: Injection) -> None:
 
 
 def _gateway_killed(rig: Rig, injection: Injection) -> None:
-    gateway = rig.pid("gateway")
+    gateway = _grown_up(rig, "gateway")
     injection.must_reach(pb.HOLD, within_s=GATEWAY_SILENT_S + 0.05)
     injection.begin()
     os.kill(gateway, signal.SIGKILL)
-    rig.wait_until(lambda: rig.pid("gateway") != gateway, "another gateway")
+    rig.wait_until(lambda: rig.pid("gateway") != gateway, "another gateway", _REVIVED_S)
 
 
 def _gateway_stopped(rig: Rig, injection: Injection) -> None:
@@ -110,14 +125,14 @@ def _outsider(name: str, number: int) -> Callable[[Rig, Injection], None]:
     """Recorder or viewer: the arm goes on as if nothing were."""
 
     def inject(rig: Rig, injection: Injection) -> None:
-        pid = rig.pid(name)
+        pid = _grown_up(rig, name)
         injection.begin()
         os.kill(pid, number)
         if number == signal.SIGSTOP:
             rig.wait_until(enough(injection.random.uniform(0.3, 1.5)), "its sleep")
             os.kill(pid, signal.SIGCONT)
         else:
-            rig.wait_until(lambda: rig.pid(name) != pid, f"another {name}")
+            rig.wait_until(lambda: rig.pid(name) != pid, f"another {name}", _REVIVED_S)
         injection.must_go_on()
 
     return inject
