@@ -166,6 +166,14 @@ def test_a_target_that_is_only_checked_counts_for_nothing() -> None:
     lease.take("bob", "", False, TIMEOUT_S + 0.1)  # nor does it keep the lease
 
 
+def test_a_target_whose_lease_changed_hands_after_its_check_is_refused() -> None:
+    lease, secret = held()
+    lease.check_target("ann", secret, 1)
+    lease.take("bob", "", True, 0.0)
+    with pytest.raises(TargetRejected, match="bob has it"):
+        lease.take_target("ann", secret, 1, 0.0)
+
+
 @pytest.mark.parametrize(
     "client",
     ["", "x" * 65, "\x1b[2J", "a\nb", "a\rb", "\x00", "\x7f", "a/b", "a*", "$", "?", "#",
@@ -178,7 +186,7 @@ def test_a_holder_has_a_name_that_can_be_told(client: str) -> None:
     assert str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize("client", ["ann", "x" * 64, "Jürgen's arm", "a@b-1f", "日本"])
+@pytest.mark.parametrize("client", ["a", "ann", "x" * 64, "Jürgen's arm", "a@b-1f", "日本"])
 def test_any_printable_name_may_hold_it(client: str) -> None:
     lease = Lease(TIMEOUT_S)
     lease.take(client, "", False, 0.0)
