@@ -165,7 +165,7 @@ class ModeKeeper:
         if self.mode == Mode.ACTIVE:
             self._watch_active(now_s, in_mode_s, now)
         elif self.mode == Mode.HOLD:
-            self._watch_hold(now_s, now)
+            self._watch_hold(now_s)
         elif self.mode == Mode.IDLE and now.pressure_near_zero and recording:
             self.apply(ModeEvent.VENTED, now_s)
 
@@ -178,12 +178,12 @@ class ModeKeeper:
         elif now.target_age_s > self._timeouts.target_s:
             self.apply(ModeEvent.TARGET_STALE, now_s)
 
-    def _watch_hold(self, now_s: float, now: Conditions) -> None:
-        full_s = now_s - max(self._entered_s, self._not_full_s)
+    def _watch_hold(self, now_s: float) -> None:
+        full_s = now_s - self._not_full_s
         alone_s = now_s - max(self._entered_s, self._operator_s)
-        if now.disk == Disk.FULL and full_s > self._timeouts.full_disk_vent_s:
+        if full_s > self._timeouts.full_disk_vent_s:
             self.apply(ModeEvent.DISK_STILL_FULL, now_s)
-        elif not now.operator and alone_s > self._timeouts.hold_s:
+        elif alone_s > self._timeouts.hold_s:
             self.apply(ModeEvent.HOLD_TIMEOUT, now_s)
 
     def tell(self, notice: Notice, client: str = "") -> None:
