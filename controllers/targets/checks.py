@@ -25,6 +25,9 @@ FASTEST_RAD_S = 20.0
 
 _UNIT_TOLERANCE = 1e-3
 
+#: No radius, frequency or period of an arm is smaller or larger, whatever its unit.
+_SMALLEST, _LARGEST = 1e-6, 1e6
+
 
 class Allowed:
     """What one arm allows: where, how far, and how fast (m/s, m/s^2) a reference may move."""
@@ -34,6 +37,7 @@ class Allowed:
     ) -> None:
         self.arm = arm
         self.speed_m_s, self.acceleration_m_s2 = speed_m_s, acceleration_m_s2
+        self.farthest_m = FARTHEST_ARM_LENGTHS * arm.max_length_m
         self.lengths_m = length_bounds_m(arm)
         self.pressures_pa = arm.per_chamber("pressure_min_pa"), arm.per_chamber("pressure_max_pa")
 
@@ -52,7 +56,7 @@ class Allowed:
     def check_near(self, position_m: Array) -> None:
         """Refuse what is no position in metres."""
         distance = math.hypot(*position_m)
-        if distance > FARTHEST_ARM_LENGTHS * self.arm.max_length_m:
+        if distance > self.farthest_m:
             raise TargetRejected(
                 f"position_m = {listed(position_m)} is {distance:.3g} m from the base, more than "
                 f"{FARTHEST_ARM_LENGTHS:g} arm lengths; is it in mm?"
@@ -138,10 +142,10 @@ def quaternion(fields: Fields, name: str) -> Array:
 
 
 def positive(fields: Fields, name: str) -> float:
-    """A finite number above 0."""
+    """A number above 0, of a size that the powers and quotients of some are finite too."""
     value: float = fields[name]
-    if not 0.0 < value < math.inf:
-        raise TargetRejected(f"{name} = {value:g}: it must be finite and above 0")
+    if not _SMALLEST <= value <= _LARGEST:
+        raise TargetRejected(f"{name} = {value:g}; allowed: {_SMALLEST:g} to {_LARGEST:g}")
     return value
 
 

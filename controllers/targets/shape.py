@@ -1,5 +1,6 @@
 """What the ready motions of the tip over their own time have in common."""
 
+import math
 from abc import abstractmethod
 
 import numpy as np
@@ -7,13 +8,13 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import TargetRejected
 from pneuarm.controllers.geometry.moving_point import MovingPoint
-from pneuarm.controllers.targets.checks import Allowed
+from pneuarm.controllers.targets.checks import FARTHEST_ARM_LENGTHS, Allowed
 from pneuarm.controllers.targets.target import Target
 from pneuarm.controllers.tasks.wanted import Wanted
 
 Triple = tuple[float, float, float]
 
-_SAMPLES, _MARKS = 400, 73
+SAMPLES, _MARKS = 400, 73
 
 #: Of the limits of the reference: an axis has its share, less what rounding needs.
 _AXIS_SHARE = 0.98 * 3.0**-0.5
@@ -53,16 +54,29 @@ class ShapeTarget(Target):
         times = np.linspace(0.0, min(self.span_s, self.duration_s), _MARKS)
         return [(f"the point at {t:.3g} s", np.array(self.at(float(t)).position)) for t in times]
 
-    def check_speed(self, allowed: Allowed) -> None:
-        """Refuse a shape that moves faster than the reference may along an axis."""
-        points = [self.at(float(t)) for t in np.linspace(self.start_s, self.span_s, _SAMPLES)]
+    def samples_s(self) -> Array:
+        """Times between which the tip does nothing that is not seen at them."""
+        return np.linspace(self.start_s, self.span_s, SAMPLES)
+
+    def check_motion(self, allowed: Allowed) -> None:
+        """Refuse a shape that is far away, or faster than the reference may be along an axis."""
+        times = self.samples_s().tolist()
+        points = [self.at(time_s) for time_s in times]
+        for time_s, point in zip(times, points, strict=True):
+            distance = math.hypot(*point.position)
+            if not distance <= allowed.farthest_m:
+                raise TargetRejected(
+                    f"the shape is {distance:.3g} m from the base at {time_s:.6g} s, more than "
+                    f"{FARTHEST_ARM_LENGTHS:g} arm lengths; is it in mm, or are waypoints too "
+                    "unevenly spaced in time?"
+                )
         speed = np.abs([point.velocity for point in points]).max()
         force = np.abs([point.acceleration for point in points]).max()
         for name, unit, largest, most in (
             ("speed_max_mm_s", "mm/s", speed, _AXIS_SHARE * allowed.speed_m_s),
             ("acceleration_max_mm_s2", "mm/s^2", force, _AXIS_SHARE * allowed.acceleration_m_s2),
         ):
-            if largest > most:
+            if not largest <= most:  # a NaN too
                 raise TargetRejected(
                     f"the shape needs {1e3 * largest:.0f} {unit} along an axis; allowed are "
                     f"{1e3 * most:.0f} (reference.{name} over the root of three): give it more "

@@ -13,12 +13,15 @@ from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import TargetRejected
 from pneuarm.controllers.geometry.moving_point import MovingPoint
 from pneuarm.controllers.targets import checks
-from pneuarm.controllers.targets.shape import ShapeTarget, Triple, triple
+from pneuarm.controllers.targets.shape import SAMPLES, ShapeTarget, Triple, triple
 from pneuarm.controllers.targets.target import LawName
 
 MAX_WAYPOINTS = 200
 _SHORTEST_S = 0.01
 _LONGEST_S = 3600.0
+
+#: A quintic has no more extremes of its speed and acceleration than these show.
+_PIECE_SAMPLES = 12
 
 _ZERO = [0.0, 0.0, 0.0]
 
@@ -66,6 +69,12 @@ class TrajectoryTarget(ShapeTarget):
     def marks(self) -> list[tuple[str, Array]]:
         """Return the waypoints."""
         return [(f"waypoint {i}", np.array(p)) for i, p in enumerate(self.positions_m, 1)]
+
+    def samples_s(self) -> Array:
+        """So many in each piece, however short it is beside the others."""
+        pieces = list(pairwise(self.times_s))
+        each = max(SAMPLES // len(pieces), _PIECE_SAMPLES)
+        return np.concatenate([np.linspace(before, after, each) for before, after in pieces])
 
     def __post_init__(self) -> None:
         """Find the coefficients of every piece."""

@@ -45,7 +45,7 @@ class TargetChecker:
         target = KINDS[name].checked(plain(getattr(message, name)), self._allowed, law)
         if isinstance(target, ShapeTarget) and not same(target, self._passed):
             self._check_reach(target)  # once: the same shape comes again and again
-            target.check_speed(self._allowed)
+            target.check_motion(self._allowed)
             self._passed = target
         return target
 

@@ -54,12 +54,32 @@ def test_waypoints_are_taken_as_they_come() -> None:
         (line_target(HOME, (0.03, 0.0, 0.2), 0.0), "period_s = 0"),
         (line_target(HOME, (0.03, 0.0, 0.2), 0.01), "along an axis"),
         (line_target((float("nan"), 0.0, 0.2), HOME, 1.0), "finite"),
+        # Powers and quotients of these are not finite.
+        (circle_target(HOME, 5e-324, 1e160), "radius_m"),
+        (circle_target(HOME, 1e20, 1e-160), "radius_m"),
+        (circle_target(HOME, 0.02, 5e-324), "frequency_hz"),
+        (circle_target(HOME, 0.02, 1.7e308), "frequency_hz"),
+        (line_target(HOME, HOME, 5e-324), "period_s"),
+        (line_target(HOME, HOME, 1.7e308), "period_s"),
     ],
 )
 def test_a_bad_shape_is_refused_in_one_sentence(message: pb.Target, words: str) -> None:
     with pytest.raises(TargetRejected, match=words) as refused:
         CHECKER.target(message)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_short_piece_among_long_ones_is_seen() -> None:
+    """400 samples of an hour are 9 s apart; this one is at rest but for a second of it."""
+    middle = [(1800.0 + 0.05 * n, (0.02 * (n == 0), 0.0, 0.2)) for n in range(-20, 21)]
+    with pytest.raises(TargetRejected, match="speed_max_mm_s"):
+        CHECKER.target(trajectory_target([(0.0, HOME), *middle, (3600.0, HOME)]))
+
+
+def test_what_swings_far_between_its_waypoints_is_refused() -> None:
+    waypoints = [(0.0, HOME), (1800.0, HOME), (1800.2, (0.004, 0.0, 0.2)), (3600.0, HOME)]
+    with pytest.raises(TargetRejected, match=r"arm lengths.*waypoints"):
+        CHECKER.target(trajectory_target(waypoints))
 
 
 def test_reach_is_left_to_the_arm_where_a_tool_is_on_it() -> None:
