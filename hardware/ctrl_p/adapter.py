@@ -23,6 +23,8 @@ READ_WAIT_PERIODS = 1.5
 REPEAT_S = 0.2
 #: What was set at the connection is read back so often (s), for ever.
 LOOK_S = 1.0
+#: So many questions for one setting may stay without an answer: lines get lost.
+MOST_UNANSWERED = 2
 
 TRIPPED = (
     "its own over-pressure protection has emptied every channel: a pressure was above ceiling_bar"
@@ -124,6 +126,7 @@ class CtrlP:
         self._heard_s = self._sent_s = self._asked_s = -math.inf
         self._kept: dict[str, tuple[str, ...]] = {}
         self._strange: dict[str, int] = {}
+        self._unanswered: dict[str, int] = {}
         self._looked_s: float | None = None
 
     def _keep(self, command: bytes, name: str) -> Echo:
@@ -139,12 +142,24 @@ class CtrlP:
         if time_s - self._looked_s >= LOOK_S:
             self._looked_s = time_s
             for name in self._kept:
-                self._line.send(protocol.ask(name))
+                self._ask_for_kept(name)
+
+    def _ask_for_kept(self, name: str) -> None:
+        """Raise HardwareError where it says nothing any more, as with its echo switched off."""
+        asked = self._unanswered.get(name, 0)
+        if asked > MOST_UNANSWERED:
+            raise self._line.error(
+                f"did not say its {name.lower()} when it was asked {asked} times; another program "
+                "may have switched its echo off, and it is set again at the next connection"
+            )
+        self._unanswered[name] = asked + 1
+        self._line.send(protocol.ask(name))
 
     def _check_kept(self, echo: Echo) -> None:
         """Raise HardwareError where a setting is another one now, and has been so twice."""
         kept = self._kept.get(echo.name)
         same = kept is None or echo.values == kept
+        self._unanswered[echo.name] = 0
         self._strange[echo.name] = 0 if same else self._strange.get(echo.name, 0) + 1
         if kept is not None and self._strange[echo.name] > 1:
             raise self._line.error(

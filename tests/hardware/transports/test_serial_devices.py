@@ -229,6 +229,17 @@ def test_what_was_set_once_on_a_ctrl_p_is_read_back_for_ever(line: bytes) -> Non
         assert line.split(b";")[0].decode() in error_within(adapter, 5.0)
 
 
+def test_a_ctrl_p_that_no_longer_says_how_it_is_set_is_told() -> None:
+    """Without its echo nothing could be read back, and no trip be seen."""
+    with ctrl_p(timeout_s=5.0) as (adapter, emulator, terminal):
+        adapter.connect()
+        with terminal.lock:
+            emulator.take(b"echo;0\n", time.monotonic())
+        assert "echo" in error_within(adapter, 6.0)
+        adapter.connect()
+        read_for(adapter, 0.1)
+
+
 def test_an_esp32_that_has_begun_to_fill_the_chambers_is_emptied() -> None:
     """After power came it controls lengths, without being asked."""
     with esp32() as (adapter, emulator, _):
