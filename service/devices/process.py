@@ -29,6 +29,10 @@ from pneuarm.service.processes.shared import Shared, ignore_terminal_signals, pa
 #: nothing but zeros was ever asked for, and this process keeps the device content by itself.
 WARM_UP_COMMANDS = 10
 
+#: Runs on while the machine is suspended, as the device's watchdog does; the monotonic clock, by
+#: which commands get old, stands still then.
+_GAP_CLOCK = time.CLOCK_BOOTTIME
+
 _RETRY_S = 0.3
 _IDLE_S = 0.005
 _VENT_BEFORE_END_S = 3.0
@@ -121,7 +125,7 @@ class DeviceProcess:
     def _exchange(self, command: DeviceCommand | None) -> None:
         """Write and read; after a longer pause read first: the device may not be as it was."""
         try:
-            if time.monotonic() - self._exchanged_s > self._look_first_s:
+            if time.clock_gettime(_GAP_CLOCK) - self._exchanged_s > self._look_first_s:
                 self._measure()
             self._write(command)
             self._measure()
@@ -134,20 +138,20 @@ class DeviceProcess:
         Called before and after each call: this process may be stopped in the middle of one. While
         nothing but zeros has been sent there is nothing that could come back.
         """
-        now_s = time.monotonic()
+        now_s = time.clock_gettime(_GAP_CLOCK)
         gap_s, self._exchanged_s = now_s - self._exchanged_s, now_s
         if gap_s > self._gap_max_s and self._device.sent_pa.any():
             raise HardwareError(
                 f"the device was not talked to for {1e3 * gap_s:.0f} ms (allowed: "
-                f"{1e3 * self._gap_max_s:.0f} ms): its process stood still, or the device answers "
-                "too slowly, and it may have vented by itself; end what keeps the machine busy, "
-                "then reset"
+                f"{1e3 * self._gap_max_s:.0f} ms): its process stood still, the machine slept, or "
+                "the device answers too slowly, and it may have vented by itself; end what keeps "
+                "the machine busy, then reset"
             )
 
     def _vent(self) -> None:
         """Send zeros."""
         self._device.vent(time.monotonic())
-        self._exchanged_s = time.monotonic()
+        self._exchanged_s = time.clock_gettime(_GAP_CLOCK)
 
     def _write(self, command: DeviceCommand | None) -> None:
         warm = command is not None and command.sequence > WARM_UP_COMMANDS

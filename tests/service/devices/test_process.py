@@ -1,6 +1,7 @@
 """The device process on a clock of its own: what it does to the device, and when it ends."""
 
 import multiprocessing
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -23,6 +24,11 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_s = 100.0
+        self.suspended_s = 0.0
+
+    def clock_gettime(self, number: int) -> float:
+        assert number == time.CLOCK_BOOTTIME
+        return self.now_s + self.suspended_s
 
     def monotonic(self) -> float:
         return self.now_s
@@ -216,6 +222,19 @@ def test_commands_get_old_after_three_periods_or_50_ms(
     rig.clock.sleep(0.02 * oldest_s)
     process.step()
     assert rig.state == LinkState.SILENT
+
+
+@pytest.mark.parametrize("asleep_s", [0.2, 3600.0])
+def test_a_machine_that_was_suspended_comes_back_with_zeros(rig: Rig, asleep_s: float) -> None:
+    """Nothing got old by the clock of the commands; the device's watchdog has run out."""
+    rig.active()
+    rig.device.asked.clear()
+    rig.clock.suspended_s += asleep_s
+    rig.tick(SOME_PA)
+    assert rig.state == LinkState.LOST
+    rig.ticks(20, SOME_PA)
+    assert not rig.device.asked
+    assert np.array_equal(rig.device.set_pa, ZEROS)
 
 
 def test_silence_is_zeros_once_and_then_no_traffic_until_a_fresh_command(rig: Rig) -> None:
