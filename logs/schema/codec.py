@@ -28,17 +28,22 @@ def is_json(encoding: str) -> bool:
     return encoding.split(";")[0] in (JSON, "text/json")
 
 
-def decode(message_type: type[M], payload: bytes, encoding: str, *, tolerant: bool = False) -> M:
+def decode(
+    message_type: type[M],
+    payload: bytes,
+    encoding: str,
+    *,
+    tolerant: bool = False,
+    most_bytes: int = MAX_PAYLOAD_BYTES,
+) -> M:
     """Read a message; raises MessageRejected with one sentence for anything that is not one.
 
     What the daemon takes may hold nothing that it does not know. What it gives is read
     ``tolerant``, so that a newer daemon may say more than an older client knows.
     """
     name = message_type.DESCRIPTOR.full_name
-    if len(payload) > MAX_PAYLOAD_BYTES and not tolerant:
-        raise MessageRejected(
-            f"payload of {len(payload)} bytes; at most {MAX_PAYLOAD_BYTES} are read"
-        )
+    if len(payload) > most_bytes and not tolerant:
+        raise MessageRejected(f"payload of {len(payload)} bytes; at most {most_bytes} are read")
     schema = encoding.partition(";")[2]
     if schema and schema != name:
         raise MessageRejected(f"message of type {schema[:100]!r}; this key takes {name}")

@@ -42,7 +42,7 @@ from pneuarm.service.processes.shared import (
     parent_is_alive,
 )
 from pneuarm.service.wire.allowance import Allowance
-from pneuarm.service.wire.answers import answer
+from pneuarm.service.wire.answers import Answer
 from pneuarm.service.wire.gateway_events import Notes
 from pneuarm.service.wire.inbox import Inbox
 from pneuarm.service.wire.lease import Lease, check_name
@@ -60,6 +60,9 @@ _REPEAT_STOP_S = 0.02
 
 #: Requests for one action in a second: from who proves to hold the lease, and from all others.
 _REQUESTS_PER_S = 100.0
+
+#: No request is larger; reading one as large as a target may be takes 30 ms.
+_REQUEST_BYTES = 2048
 
 #: Queries that wait for control's answer, or to be read; the newest requests are kept.
 _WAITING = 256
@@ -101,6 +104,7 @@ class Gateway:
         self._arm = shared.configuration.build_arm()
         self._lease = Lease(control.lease_timeout_s)
         self._publisher = Publisher(shared, self._arm, session)
+        self._info = Answer(shared.info)
         self._lock = threading.RLock()  # every key has a thread of its own
         # A stop waits for this one only, which nobody holds for longer than it takes to send.
         self._request_lock = threading.RLock()
@@ -184,7 +188,7 @@ class Gateway:
             self._request(ModeEvent.LEASE_LOST, client)
 
     def _on_info(self, query: zenoh.Query) -> None:
-        answer(query, full_key(self._arm.name, INFO.key), self._shared.info)
+        self._info.give(query, full_key(self._arm.name, INFO.key))
 
     def _on_mode(self, query: zenoh.Query) -> None:
         payload = b"" if query.payload is None else query.payload.to_bytes()
@@ -192,7 +196,9 @@ class Gateway:
         holder = self._lease.is_proved_by(payload)
         asked = _Asked(query, full_key(self._arm.name, MODE.key))
         try:
-            request = decode(pb.ModeRequest, payload, str(query.encoding))
+            request = decode(
+                pb.ModeRequest, payload, str(query.encoding), most_bytes=_REQUEST_BYTES
+            )
             self._check_request(request, holder)
             self._handle(request, asked)
         except (MessageRejected, LeaseRefused) as error:
@@ -263,7 +269,7 @@ class Gateway:
 
     @staticmethod
     def _reply(asked: _Asked, message: pb.Reply) -> None:
-        answer(asked.query, asked.key, message)
+        Answer(message).give(asked.query, asked.key)
 
     def _answer(self, reply: ModeReply) -> None:
         """Pass on what control has said; an arm that is stopped answers every stop before it."""

@@ -27,7 +27,7 @@ from pneuarm.logs.schema.topics import (
 )
 from pneuarm.service.processes.shared import Shared
 from pneuarm.service.processes.usage import ProcessUsage
-from pneuarm.service.wire.answers import answer
+from pneuarm.service.wire.answers import Answer
 from pneuarm.service.wire.event_history import EventHistory
 
 _HEALTH_S = 1.0
@@ -55,7 +55,7 @@ class Publisher:
             for topic in (*_LATEST, EVENT)
         }
         self._history = EventHistory()
-        self._latest: dict[str, Message] = {EVENTS.key: self._history.message()}
+        self._latest = {EVENTS.key: Answer(self._history.message())}
         self._since_health: list[bytes] = []
         self._health_at_s = 0.0
         self._usage = ProcessUsage(shared.processes)
@@ -64,14 +64,14 @@ class Publisher:
 
     def on_latest(self, topic: Topic, query: zenoh.Query) -> None:
         """Answer with the newest message of a key; without one, there is no answer."""
-        message = self._latest.get(topic.key)
-        if message is None:
+        newest = self._latest.get(topic.key)
+        if newest is None:
             query.drop()
         else:
-            answer(query, full_key(self._arm.name, topic.key), message)
+            newest.give(query, full_key(self._arm.name, topic.key))
 
     def _publish(self, topic: Topic, message: Message) -> None:
-        self._latest[topic.key] = message
+        self._latest[topic.key] = Answer(message)
         self._publishers[topic.key].put(message.SerializeToString(), encoding=encoding_of(message))
 
     def step(
@@ -88,7 +88,7 @@ class Publisher:
                 event = pb.Event.FromString(payload)
                 self._publish(EVENT, event)
                 self._history.add(event)
-                self._latest[EVENTS.key] = self._history.message()
+                self._latest[EVENTS.key] = Answer(self._history.message())
         if now_s - self._health_at_s >= _HEALTH_S and self._since_health:
             health = self._health(now_s)
             health.rejected_messages, health.command_drops = rejected, command_drops

@@ -23,7 +23,9 @@ from pneuarm.logs.schema.codec import JSON, PROTOBUF
 from pneuarm.logs.schema.topics import EVENT
 from pneuarm.service.configuration.configuration import load
 from pneuarm.service.processes.pipe import Pipe, SetTarget, SetTipPose, new_pipe
+from pneuarm.service.wire import answers
 from pneuarm.service.wire.allowance import Allowance
+from pneuarm.service.wire.answers import Answer
 from pneuarm.service.wire.gateway import Gateway
 from pneuarm.service.wire.gateway_events import Notes
 from pneuarm.service.wire.inbox import Inbox
@@ -182,6 +184,34 @@ def test_any_request_is_passed_on_or_answered(message: Message, as_json: bool) -
     gateway._on_mode(query)  # type: ignore[arg-type]
     assert len(query.replies) + len(gateway._pending) == 1
     assert isinstance(control, Pipe)
+
+
+def test_a_request_that_takes_long_to_read_is_refused_unread() -> None:
+    """It would stand before those of everybody else: 256 of them for 9 s."""
+    gateway = Gateway.__new__(Gateway)
+    taking = Taking()
+    gateway.__dict__ |= {
+        "_arm": SimpleNamespace(name="paper"),
+        "_shared": SimpleNamespace(info=SimpleNamespace(versions={"pneuarm": "0"})),
+        "_lease": taking.lease,
+        "_notes": taking.notes,
+        "_publisher": taking.publisher,
+    }
+    sample = Sample.of(b'{"client_id": "' + b"a" * 60000 + b'"}', JSON)
+    query = Query(sample.payload, PROTOBUF, "pneuarm/paper/cmd/mode")
+    gateway._on_mode(query)  # type: ignore[arg-type]
+    assert "60017 bytes" in pb.Reply.FromString(query.replies[0]).reason
+
+
+def test_what_is_asked_for_again_is_encoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    encoded = []
+    monkeypatch.setattr(answers, "encode", lambda *args: encoded.append(args) or b"x")
+    newest = Answer(pb.ArmState(sequence=7))
+    for encoding in (JSON, "text/json", PROTOBUF, "") * 50:
+        query = Query(None, encoding)
+        newest.give(query, "pneuarm/paper/state")  # type: ignore[arg-type]
+        assert query.replies == [b"x"]
+    assert len(encoded) == 2
 
 
 def test_what_nobody_thought_of_is_one_sentence_that_says_where() -> None:
