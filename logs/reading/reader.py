@@ -32,6 +32,10 @@ from pneuarm.logs.schema.topics import INFO, STATE, Topic, split_key
 #: A recorder that lags writes events ahead of the ticks of their time, by a ring at most.
 _OUT_OF_ORDER_NS = int(1.2 * HOLD_S * 1e9)
 
+#: Messages that are held until it is their turn: where time stands still, or goes back all along,
+#: it never is. An arm of three sections at 1 kHz needs a half of it. A message has so much besides.
+_MOST_HELD_BYTES, _RAW_BYTES = 128 * 1024 * 1024, 400
+
 #: What the numbers of a file's channels mean; None for a channel of somebody else.
 Topics = dict[int, Topic | None]
 
@@ -236,11 +240,15 @@ def _not_ours(path: Path) -> str:
 
 
 def _in_time_order(messages: Iterable[Raw]) -> Iterator[Raw]:
-    """Sort what is out of order by some seconds, holding no more than these."""
+    """Sort what is out of order by some seconds, holding no more than these, and no more bytes."""
     waiting: list[tuple[int, int, Raw]] = []
+    held_bytes = 0
     for number, raw in enumerate(messages):
         heapq.heappush(waiting, (raw.time_unix_ns, number, raw))
-        while waiting[0][0] < raw.time_unix_ns - _OUT_OF_ORDER_NS:
-            yield heapq.heappop(waiting)[2]
+        held_bytes += _RAW_BYTES + len(raw.payload)
+        while waiting[0][0] < raw.time_unix_ns - _OUT_OF_ORDER_NS or held_bytes > _MOST_HELD_BYTES:
+            earliest = heapq.heappop(waiting)[2]
+            held_bytes -= _RAW_BYTES + len(earliest.payload)
+            yield earliest
     while waiting:
         yield heapq.heappop(waiting)[2]

@@ -175,7 +175,7 @@ class _Walk:
         self._path, self._file = path, file
         self._crc = zlib.crc32(MCAP0_MAGIC)
         self._whole = True  # so far, so that the data's checksum can be compared
-        self._checked = 0  # where the last chunk ends: what came since may be no record at all
+        self._checked = 0  # before it no chunk is left: what came since may be no record at all
 
     def pieces(self) -> Iterator[Piece]:
         begins_well = self._file.read(0, len(MCAP0_MAGIC)) == MCAP0_MAGIC
@@ -186,7 +186,8 @@ class _Walk:
                 resumed = self._resume(at)
                 begin = min(at, resumed)
                 yield Damage(self._path, begin, resumed, cut=self._is_cut(begin, resumed))
-                self._whole, at = False, resumed
+                # No chunk begins before it: what was tried once is not tried again.
+                self._whole, self._checked, at = False, resumed, resumed
             else:
                 yield piece
                 yield from self._check_data(piece)

@@ -2,6 +2,7 @@
 
 import resource
 import struct
+import time
 import zlib
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.records import Chunk
-from mcap.writer import CompressionType, Writer
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from pneuarm.controllers.arm.errors import LogError
 from pneuarm.logs.reading.reader import LogReader
@@ -159,3 +160,12 @@ def test_a_summary_counts_only_with_its_checksum(
         path.write_bytes(damaged)
         assert read_summary(path) is None
         assert not LogReader(path).finished
+
+
+def test_what_looks_like_a_record_again_and_again_is_tried_once(tmp_path: Path) -> None:
+    """From each of them everything before was tried anew: minutes for 30 kB."""
+    path, record, times = tmp_path / "log.mcap", b"\x0f" + struct.pack("<Q", 4) + b"abcd", 3000
+    path.write_bytes(MCAP0_MAGIC + (record + b"\xee") * times)
+    begun_s = time.process_time()
+    assert sum(1 for _ in walk(path)) == 2 * times + 1
+    assert time.process_time() - begun_s < 10.0

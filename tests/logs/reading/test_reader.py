@@ -1,5 +1,6 @@
 """The reader takes our logs, tells what is in them, and refuses everything else in one sentence."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from mcap.writer import Writer
 
 from pneuarm.controllers.arm.errors import LogError
+from pneuarm.logs.reading import reader
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.summary import summarise
 from pneuarm.logs.recording.part import Part
@@ -137,3 +139,23 @@ def test_ticks_are_all_ticks_in_one_array(tmp_path: Path) -> None:
     assert reader.n_sections == 1
     assert reader.ticks()["sequence"].tolist() == [4, 5, 6]
     assert reader.ticks()["time_unix_ns"].tolist() == [START_NS + n for n in (4, 5, 6)]
+
+
+@pytest.mark.parametrize("step_ns", [-1, 0])
+def test_time_that_goes_back_all_along_fills_no_memory(
+    monkeypatch: pytest.MonkeyPatch, step_ns: int
+) -> None:
+    monkeypatch.setattr(reader, "_MOST_HELD_BYTES", 100_000)
+    taken = 0
+
+    def messages() -> Iterator[reader.Raw]:
+        nonlocal taken
+        for number in range(2000):
+            taken += 1
+            yield reader.Raw(STATE, bytes(600), 10**18 + number * step_ns)
+
+    given = 0
+    for _ in reader._in_time_order(messages()):
+        given += 1
+        assert given == 2000 or taken - given <= 100
+    assert given == 2000
