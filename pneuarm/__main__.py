@@ -3,12 +3,20 @@
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from types import FrameType
 
 from pneuarm import __version__
 
+
+def asks_to_stop(words: Sequence[str]) -> bool:
+    """Whether somebody wants the arm stopped: also by what is no command, in the hurry."""
+    first = words[0] if words else ""
+    return "stop" in first.lower() or (first.startswith("-") and "estop" in words)
+
+
 #: Also to be said where nothing else of pneuarm can be loaded.
-_STOPS = sys.argv[1:2] == ["estop"]
+_STOPS = asks_to_stop(sys.argv[1:])
 
 
 def _sentence(text: str) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from pneuarm.__main__ import asks_to_stop
 from pneuarm.service.cli.ending import ended
 from pneuarm.service.cli.values import Parser, number, whole
 
@@ -334,4 +335,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parsed = build_parser().parse_args(words)
         return _call(parsed.where, parsed)
 
-    return ended(command, stops=words[:1] == ["estop"])
+    return ended(command, stops=asks_to_stop(words))

@@ -158,3 +158,23 @@ def test_where_the_daemon_is_may_be_mistyped(
     if command == "estop":
         assert "NOT CONFIRMED" in told.err
         assert "cut the air supply" in told.err
+
+
+@pytest.mark.parametrize(
+    ("words", "stops"),
+    [
+        (["--json", "estop"], True),
+        (["--", "estop"], True),
+        (["ESTOP"], True),
+        (["e-stop"], True),
+        (["stop"], True),
+        (["inform", "estop"], False),
+        ([], False),
+    ],
+)
+def test_a_mistyped_stop_is_not_confirmed(
+    words: list[str], stops: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert ("NOT CONFIRMED" in told and "cut the air supply" in told) == stops
