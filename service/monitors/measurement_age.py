@@ -1,5 +1,6 @@
 """How old a measurement is: too old to hold on to, and so old that the device is lost."""
 
+import math
 from typing import Annotated
 
 from pydantic import Field
@@ -13,9 +14,22 @@ from pneuarm.service.monitors.monitor import MS, Monitor, Observation
 _Age = Annotated[float, Field(ge=10, le=10000)]
 
 
+#: A tick may begin so long (s) after it was due, and what is measured then is new.
+_LATE_TICK_S = 0.1
+
+
 def measurement_age_s(measurement: Measurement, now_s: float) -> float:
-    """How old a measurement is; one taken while the tick was already due counts as new."""
-    return 0.0 if measurement.taken_s is None else max(0.0, now_s - measurement.taken_s)
+    """How old a measurement is; one taken while the tick was already due counts as new.
+
+    A stamp further ahead is of another clock, and would be new for ever: it is as old as it is
+    ahead. One that is no number is of no time.
+    """
+    if measurement.taken_s is None:
+        return 0.0
+    age_s = now_s - measurement.taken_s
+    if math.isnan(age_s):
+        return math.inf
+    return 0.0 if -_LATE_TICK_S <= age_s < 0.0 else abs(age_s)
 
 
 class _TooOld(Monitor):

@@ -18,7 +18,11 @@ from pneuarm.service.monitors.device import DeviceComplains, StopPressed
 from pneuarm.service.monitors.estimate_diverges import EstimateDiverges
 from pneuarm.service.monitors.leak import SETTLED_S, Leak
 from pneuarm.service.monitors.loop_overruns import LoopOverruns
-from pneuarm.service.monitors.measurement_age import DeviceLost, MeasurementOld
+from pneuarm.service.monitors.measurement_age import (
+    DeviceLost,
+    MeasurementOld,
+    measurement_age_s,
+)
 from pneuarm.service.monitors.model_contradicted import OLDEST_S, ModelContradicted, TipModel
 from pneuarm.service.monitors.monitor import Monitor, Observation, Persistence, bar, chamber
 from pneuarm.service.monitors.monitors import MONITORS, Lag, Monitors
@@ -398,3 +402,15 @@ def test_every_monitor_has_its_keys_by_the_code_of_its_fault() -> None:
         code: type(table) for code, table in tables.items()
     }
     assert all(kind.looks_at for kind in MONITORS)
+
+
+@pytest.mark.parametrize("stamp_s", [nan, inf, 1.8e9, 1.5, -inf])
+def test_a_stamp_of_another_clock_is_never_new(stamp_s: float) -> None:
+    """As of an adapter that takes the time of day: what it measured once would be new for ever."""
+    measurement = Measurement(np.zeros((1, 3)), np.full((1, 3), nan), taken_s=10.0 + stamp_s)
+    assert measurement_age_s(measurement, 10.0) >= 1.0
+
+
+def test_what_was_taken_while_the_tick_was_due_is_new() -> None:
+    measurement = Measurement(np.zeros((1, 3)), np.full((1, 3), nan), taken_s=10.05)
+    assert measurement_age_s(measurement, 10.0) == 0.0
