@@ -3,6 +3,7 @@
 import multiprocessing
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pneuarm.controllers.arm.errors import HardwareError
 from pneuarm.hardware.interface import Measurement
 from pneuarm.service.configuration.configuration import load
 from pneuarm.service.devices import process as module
+from pneuarm.service.devices.keeper import DeviceKeeper
 from pneuarm.service.devices.process import WARM_UP_COMMANDS, DeviceProcess
 from pneuarm.service.processes.device_slots import DeviceLink, DeviceWatch, LinkedDevice, LinkState
 
@@ -235,6 +237,33 @@ def test_a_machine_that_was_suspended_comes_back_with_zeros(rig: Rig, asleep_s: 
     rig.ticks(20, SOME_PA)
     assert not rig.device.asked
     assert np.array_equal(rig.device.set_pa, ZEROS)
+
+
+def test_a_gap_while_nothing_but_zeros_was_sent_is_no_loss(rig: Rig) -> None:
+    rig.ticks(WARM_UP_COMMANDS + 2, None)
+    rig.clock.suspended_s += 3600.0
+    rig.tick(None)
+    assert rig.state == LinkState.CONNECTED
+
+
+def test_a_dead_process_is_zeroed_for_once_until_it_lives_again() -> None:
+    """Each zeroing connects anew, for a second where the device is gone: the supervisor waits."""
+    alive, zeroed = [False], []
+    keeper = DeviceKeeper.__new__(DeviceKeeper)
+    keeper._child = SimpleNamespace(is_alive=lambda: alive[0], kill=lambda: None)  # type: ignore[assignment]
+    keeper._watch = SimpleNamespace(standing=lambda: None)  # type: ignore[assignment]
+    keeper._spare = SimpleNamespace(  # type: ignore[assignment]
+        connect=lambda: None, vent=zeroed.append, close=lambda: None
+    )
+    keeper._zeroed = False
+    for _ in range(3):
+        assert keeper.look_after() == ""
+    assert len(zeroed) == 1
+    alive[0] = True
+    keeper.look_after()
+    alive[0] = False
+    keeper.look_after()
+    assert len(zeroed) == 2
 
 
 def test_silence_is_zeros_once_and_then_no_traffic_until_a_fresh_command(rig: Rig) -> None:
