@@ -128,7 +128,7 @@ class Gateway:
             return serve(declare, last_resort(work, partial(self._refuse, key)), _WAITING)
 
         def heed(work: Callable[[Any], None]) -> Any:
-            return at_once(last_resort(work, lambda sample, why: self._notes.reject("", why)))
+            return at_once(last_resort(work, self._refuse_at_once))
 
         return [
             session.declare_subscriber(stop, heed(self._on_estop)),
@@ -151,6 +151,7 @@ class Gateway:
             query.reply_err(f"{key}: {why}")
 
     def _refuse_at_once(self, item: zenoh.Sample | zenoh.Query, why: str) -> None:
+        """Tell of a sample or query of the stop, or of a token, that could not be handled."""
         self._notes.reject(str(item.key_expr).split("/", 2)[-1], why)
 
     def _on_estop(self, sample: zenoh.Sample) -> None:

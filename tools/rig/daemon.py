@@ -299,6 +299,11 @@ class Daemon:
             self.kill()
 
 
+def wait_for_event(client: Client, code: str) -> None:
+    """Wait until the client hears of an event: it may come after the state that shows its cause."""
+    wait_for(lambda: code in {event.code for event in client.events()}, f"the event {code}")
+
+
 def arm(client: Client) -> None:
     """Take the lease and arm; an arm that is still active from before stays so."""
 

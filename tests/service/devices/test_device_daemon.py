@@ -62,7 +62,10 @@ def fault_and_reset(daemon: Daemon, emulator: Emulator, words: str) -> None:
     with daemon.client() as client:
         wait_for(lambda: client.state().mode == pb.FAULT, "a fault")
         wait_for(emulator.zero_since, "zeros at the terminal")
-        assert any(words in event.cause + event.text for event in client.events())
+        wait_for(
+            lambda: any(words in event.cause + event.text for event in client.events()),
+            "the event with its cause",
+        )
     # Nothing re-arms by itself, and it is ready only through a reset, with the cause gone.
     with daemon.client() as client:
         wait_for(lambda: is_ready_after_reset(client), "the arm to be ready again")

@@ -10,7 +10,7 @@ import pytest
 from pneuarm.controllers.arm.errors import TargetRejected
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.target_messages import circle_target, trajectory_target
-from tools.rig.daemon import ROOT, Daemon, run_command, wait_for
+from tools.rig.daemon import ROOT, Daemon, run_command, wait_for, wait_for_event
 
 
 def position(values: object) -> np.ndarray:
@@ -41,7 +41,7 @@ def test_the_camera_program_takes_the_tip_to_its_target_and_is_missed(tmp_path: 
             camera.terminate()
             camera.wait(10)
         wait_for(lambda: client.state().tip_estimated_source == pb.FROM_PRESSURES, "the loss")
-        assert "camera_lost" in {event.code for event in client.events()}
+        wait_for_event(client, "camera_lost")
 
 
 def test_shapes_run_to_their_end_and_bad_ones_are_refused(tmp_path: Path) -> None:
