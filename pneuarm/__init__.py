@@ -21,6 +21,8 @@ if TYPE_CHECKING:
         DaemonUnreachable,
         HardwareError,
         InvalidInput,
+        LearningDiverges,
+        LearningError,
         LeaseRefused,
         LogError,
         MessageRejected,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
         NotInstalled,
         PneuarmError,
         TargetRejected,
+        TrialLost,
     )
     from pneuarm.service.client.client import Client
 
@@ -43,6 +46,8 @@ __all__ = [
     "DaemonUnreachable",
     "HardwareError",
     "InvalidInput",
+    "LearningDiverges",
+    "LearningError",
     "LeaseRefused",
     "LogError",
     "MessageRejected",
@@ -52,6 +57,7 @@ __all__ = [
     "NotInstalled",
     "PneuarmError",
     "TargetRejected",
+    "TrialLost",
     "__version__",
 ]
 

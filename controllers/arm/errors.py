@@ -7,6 +7,9 @@ PneuarmError
 |-- HardwareError           a device: connection, answer, diagnosis
 |-- LogError                a session log
 |-- CalibrationError        a motion, or a log, that does not show what a calibration needs
+|-- LearningError           a trajectory, or its trials, from which nothing can be learnt
+|   |-- LearningDiverges    trials that become worse
+|   `-- TrialLost           one trial that shows nothing; another one may
 |-- NotInstalled            a package, or a part of pneuarm, that a command needs
 |-- MessageRejected         a message that cannot be read, or that this key does not take
 |   `-- TargetRejected      a target that was read, and that the daemon does not take
@@ -48,6 +51,18 @@ class LogError(PneuarmError):
 
 class CalibrationError(PneuarmError):
     """What was moved or recorded does not determine the map; the text says what is missing."""
+
+
+class LearningError(PneuarmError):
+    """A trajectory cannot be learnt, or its trials do not show what was to be learnt."""
+
+
+class LearningDiverges(LearningError):
+    """The error grows from trial to trial."""
+
+
+class TrialLost(LearningError):
+    """A trial was not measured as a whole; nothing was learnt from it."""
 
 
 class NotInstalled(PneuarmError):

@@ -53,15 +53,21 @@ Word = Callable[[str], bool]
 
 def require_tip(client: Client) -> None:
     """Raise CalibrationError where no tip pose arrives at the daemon."""
-    if not _measured(client.state()):
-        raise CalibrationError(
-            f"the tip of arm {client.arm!r} is not measured: a calibration needs its pose on "
-            f"pneuarm/{client.arm}/sensor/tip_pose; start the motion capture, or `pneuarm emulate "
-            "camera` beside a simulated arm"
-        )
+    if not is_measured(client.state()):
+        raise CalibrationError(not_measured(client.arm, "a calibration"))
 
 
-def _measured(state: pb.ArmState) -> bool:
+def not_measured(arm: str, what: str) -> str:
+    """Say what to do where no tip pose arrives, and ``what`` needs one."""
+    return (
+        f"the tip of arm {arm!r} is not measured: {what} needs its pose on "
+        f"pneuarm/{arm}/sensor/tip_pose; start the motion capture, or `pneuarm emulate camera` "
+        "beside a simulated arm"
+    )
+
+
+def is_measured(state: pb.ArmState) -> bool:
+    """Whether the tip is measured now."""
     return len(state.tip_measured_position_m) == 3 and state.tip_measured_age_s < _LOST_S
 
 
@@ -198,17 +204,17 @@ def _require_going_on(client: Client, state: pb.ArmState) -> None:
         mode = name_of(pb.Mode, state.mode)
         raise ModeRefused(
             f"the arm went to mode {mode} in the middle of the calibration"
-            f"{_cause(client, state.mode)}"
+            f"{cause(client, state.mode)}"
         )
-    if not _measured(state):
+    if not is_measured(state):
         raise CalibrationError(
             "the tip was not measured any more in the middle of the calibration: see that the "
             "marker stays in view"
         )
 
 
-def _cause(client: Client, mode: "pb.Mode") -> str:
-    """What the daemon said of the change of mode: fault, cause and remedy."""
+def cause(client: Client, mode: "pb.Mode") -> str:
+    """Return what the daemon said of the change of mode, in brackets: fault, cause and remedy."""
     time.sleep(0.1)  # an event may come after the state that shows its effect
     told = client.events()
     if not told:

@@ -4,6 +4,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from google.protobuf import json_format
 from google.protobuf.message import Message
@@ -68,6 +69,8 @@ def send(arguments: argparse.Namespace) -> int:
     """Refresh a target until it is reached; leave the arm holding."""
     target = target_of(arguments)
     with _connect(arguments) as client:
+        if arguments.kind == "trajectory" and arguments.learned is not None:
+            target = _with_learned(client, target, arguments.learned)
         if client.state().mode != pb.ACTIVE or arguments.take_over:
             if not arguments.enable:
                 mode = name_of(pb.Mode, client.state().mode)
@@ -83,6 +86,14 @@ def send(arguments: argparse.Namespace) -> int:
             text = outcome(state)
     _show(arguments, state, text + "; the arm holds")
     return 0 if state.reach != pb.OUT_OF_REACH else 2
+
+
+def _with_learned(client: Client, target: pb.Target, path: Path) -> pb.Target:
+    """Add what was learnt; loaded only now, as it needs what no other target does."""
+    from pneuarm.service.configuration.configuration import recorded
+    from pneuarm.service.learning.apply import with_learned
+
+    return with_learned(target, path, recorded(client.info().config_toml, "the daemon"))
 
 
 def _send_twist(client: Client, target: pb.Target, seconds: float) -> pb.ArmState:

@@ -18,6 +18,7 @@ PRESETS = ("paper", "table1", "trunk")
 
 _ENDPOINT = "tcp/127.0.0.1:7447"
 _POSITIVE = number(0, above=True)
+_WAYPOINTS = "lines of: time in s, then x y z in mm"
 _SEED = whole(0, 2**32 - 1)
 
 
@@ -54,6 +55,7 @@ def build_parser() -> Parser:
     _add_workspace(commands)
     _add_machine(commands)
     _add_calibrate(commands)
+    _add_learn(commands)
     return parser
 
 
@@ -228,7 +230,8 @@ def _add_shapes(kinds: Subparsers) -> list[Parser]:
     line.add_argument("--period", type=_POSITIVE, default=4.0, help="s, there and back (4)")
     line.add_argument("--repeats", type=_POSITIVE, default=1.0)
     trajectory = kinds.add_parser("trajectory", help="tip through timed waypoints of a file")
-    trajectory.add_argument("file", type=Path, help="lines of: time in s, then x y z in mm")
+    trajectory.add_argument("file", type=Path, help=_WAYPOINTS)
+    trajectory.add_argument("--learned", type=Path, metavar="FILE", help="what `learn` has written")
     return [circle, line, trajectory]
 
 
@@ -325,6 +328,22 @@ def _add_calibrate(commands: Subparsers) -> None:
     calibrate.add_argument(
         "--world", action="store_true", help="poses are of a marker, in a frame not the base's"
     )
+
+
+def _add_learn(commands: Subparsers) -> None:
+    help_text = "Repeat a trajectory with the tip measured, and learn to follow it better."
+    learn = _command(commands, "learn", "pneuarm.service.learning.command:run", help_text)
+    learn.add_argument("trajectory", type=Path, metavar="TRAJECTORY", help=_WAYPOINTS)
+    learn.add_argument(
+        "--trials", type=whole(2, 1000), default=10, help="how often, the first unchanged (10)"
+    )
+    learn.add_argument(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="where to write what was learnt (TRAJECTORY-learned.toml)",
+    )
+    _add_connection(learn)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

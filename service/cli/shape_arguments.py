@@ -1,14 +1,11 @@
-"""Circle, line and trajectory from the prompt: millimetres, and a file of waypoints."""
+"""Circle, line and trajectory from the prompt: millimetres; a trajectory is a file."""
 
 import argparse
-import math
 import secrets
-from pathlib import Path
 
-from pneuarm.controllers.arm.errors import InvalidInput
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.client.target_messages import circle_target, line_target, trajectory_target
-from pneuarm.service.configuration.text_file import read_text
+from pneuarm.service.learning.waypoints import read_waypoints
 
 MM = 1e-3
 
@@ -38,33 +35,3 @@ def duration_s(target: pb.Target) -> float:
         case "trajectory":
             return target.trajectory.waypoints[-1].time_s
     return 0.0
-
-
-def read_waypoints(path: Path) -> list[tuple[float, list[float]]]:
-    """Read lines of time (s) and position (mm), separated by commas or blanks.
-
-    Lines that begin with # are left out. Raises InvalidInput with the line that is wrong.
-    """
-    waypoints = []
-    for number, line in enumerate(read_text(path).splitlines(), 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        try:
-            time_s, x, y, z = _finite(line)
-        except ValueError:
-            raise InvalidInput(
-                f"{path}, line {number}: {line[:80]!r}; four numbers are needed: time in s, then "
-                "x y z in mm"
-            ) from None
-        waypoints.append((time_s, [MM * x, MM * y, MM * z]))
-    if not waypoints:
-        raise InvalidInput(f"{path} holds no waypoints; a line is: time in s, then x y z in mm")
-    return waypoints
-
-
-def _finite(line: str) -> list[float]:
-    """Numbers of a line; raises ValueError for what is none, or not finite."""
-    values = [float(word) for word in line.replace(",", " ").split()]
-    if not all(map(math.isfinite, values)):
-        raise ValueError
-    return values

@@ -96,6 +96,15 @@ class FeedbackConfig(Table):
             "changes it no more",
         ),
     ] = 45.0
+    learned_max_share: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=1,
+            description="largest offset of the tip that `pneuarm learn` may learn, and that a "
+            "trajectory may be sent with, as a share of the arm's length",
+        ),
+    ] = 0.2
     still_max_mm: Annotated[
         Positive,
         Field(

@@ -115,6 +115,7 @@ READS_A_FILE = [
     ("emulate", "esp32", "--arm"),
     ("emulate", "ctrl-p", "--record"),
     ("calibrate", "--from"),
+    ("learn",),
 ]
 
 

@@ -1,0 +1,1 @@
+"""Learning by repeating: the feed-forward of the next trial, from the error of those before."""
