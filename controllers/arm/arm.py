@@ -3,6 +3,7 @@
 Arrays of chamber quantities have the shape ``(n_sections, 3)``; SI units throughout.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -107,19 +108,38 @@ def _frozen(values: object) -> Array:
     return array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Response:
-    """How the arm answers to a step of the pressures: dead time and lag of the valves, lowest mode.
+    """How the arm answers to a step of the pressures: dead time, lags of the valves, lowest mode.
 
-    ``delay_s`` and ``lag_s`` (first order) lie between the pressure sent and the pressure in the
-    chamber, ``mode_hz`` and ``damping_ratio`` (of the lowest bending mode) between that and the
-    shape of the arm.
+    Between the pressure u that is sent and the pressure p in a chamber lie a dead time and a lag of
+    first order, which is another one where air goes in than where it goes out:
+
+        dp/dt = (u(t - delay) - p) / lag,    filling where u(t - delay) > p, else exhausting
+
+    ``mode_hz`` and ``damping_ratio`` (of the lowest bending mode) lie between that pressure and the
+    shape of the arm. ``lead_max_pa`` is how far a setpoint may run ahead of slow valves.
     """
 
     delay_s: float = 0.005
-    lag_s: float = 0.06
+    filling_lag_s: float = 0.06
+    exhausting_lag_s: float = 0.06
     mode_hz: float = 2.2
     damping_ratio: float = 0.15
+    lead_max_pa: float = 4e3
+
+    @property
+    def slower_lag_s(self) -> float:
+        """The larger one of the two lags."""
+        return max(self.filling_lag_s, self.exhausting_lag_s)
+
+    def left(self, passed_s: float) -> tuple[float, float]:
+        """Shares of what a pressure lacks that it still lacks after a time: filling, exhausting."""
+        filling_s, exhausting_s = self.filling_lag_s, self.exhausting_lag_s
+        return (
+            math.exp(-passed_s / filling_s) if filling_s else 0.0,
+            math.exp(-passed_s / exhausting_s) if exhausting_s else 0.0,
+        )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from pneuarm.controllers.arm.errors import CalibrationError, InvalidInput
 from pneuarm.controllers.calibration.excitation import require_determined, require_motion
 from pneuarm.controllers.calibration.fit import Fit, fit
 from pneuarm.controllers.calibration.recording import Recording, find_rests
-from pneuarm.controllers.calibration.response import ResponseFit, fit_response, fit_valves
+from pneuarm.controllers.calibration.response import ResponseFit, fit_response
+from pneuarm.controllers.calibration.valve_fit import fit_valves
 from pneuarm.controllers.calibration.worth import explained, require_worth
 
 
@@ -15,14 +16,13 @@ from pneuarm.controllers.calibration.worth import explained, require_worth
 class Calibration:
     """``arm`` with everything that was fitted in place, and where it comes from.
 
-    ``response`` is None where the recording has no step; ``note`` then says so, and names what of
-    a response was not identified.
+    ``note`` names what of the response was not identified.
     """
 
     before: Arm
     arm: Arm
     fit: Fit
-    response: ResponseFit | None
+    response: ResponseFit
     note: str = ""
 
 
@@ -33,10 +33,9 @@ def calibrate(arm: Arm, recording: Recording, in_world: bool = False) -> Calibra
     does not explain the recording.
     """
     valves = fit_valves(recording, arm.response)
-    behind = replace(arm.response, delay_s=valves.delay_s, lag_s=valves.lag_s)
-    rests = find_rests(recording, behind)
+    rests = find_rests(recording, valves.response)
     require_motion(arm, recording, rests)
-    lagging = replace(arm, response=behind)
+    lagging = replace(arm, response=valves.response)
     try:
         found = fit(lagging, recording, rests, in_world)
     except InvalidInput as error:
@@ -47,9 +46,6 @@ def calibrate(arm: Arm, recording: Recording, in_world: bool = False) -> Calibra
     require_worth(found, lagging, recording, rests)
     require_determined(found)
     kept = replace(found.arm, response=arm.response)
-    try:
-        response = fit_response(kept, recording, found.frames, valves)
-    except CalibrationError as error:
-        return Calibration(arm, kept, found, None, f"the response is kept: {error}")
+    response = fit_response(kept, recording, found.frames, valves)
     fitted = replace(kept, response=response.response)
     return Calibration(arm, fitted, found, response, "; ".join(response.not_identified))

@@ -14,8 +14,9 @@ from pneuarm.controllers.arm.arm import Array, Response
 from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.valves import lagged, on_grid
 
-#: Pressures that act and change no faster than this (Pa/s) leave the arm where they belong.
-SLOW_PA_S = 1e4
+#: Pressures that act and change no faster than this (Pa/s) leave the arm where they belong. Behind
+#: slow valves nobody knows so well what acts: there they change by no more than this (Pa) in a lag.
+SLOW_PA_S, _LATE_PA = 1e4, 2000.0
 #: Pressures that change no faster than this (Pa/s) count as still.
 STILL_PA_S = 3000.0
 #: The tip is averaged over this time (s): about one swing of a soft arm.
@@ -27,7 +28,7 @@ _APART_PA = 4000.0
 #: A dither is averaged away over this time (s), which holds whole periods of it.
 _SMOOTHED_S = 0.12
 #: From one averaged time to the next a settled pressure (Pa) and tip (m) change less than this.
-_SETTLED_PA, _SETTLED_M = 600.0, 1e-3
+SETTLED_PA, _SETTLED_M = 600.0, 1e-3
 #: A rest whose measured pressure changes by more (Pa) from one half of it to the other is none.
 _RESTLESS_PA = 1500.0
 #: Between two recordings that are joined (s).
@@ -89,7 +90,7 @@ def acting_pa(recording: Recording, response: Response) -> Array:
     The lag takes back the lead by which setpoints run ahead of it.
     """
     grid_s, sent = on_grid(recording.time_s, recording.sent_pa)
-    behind = lagged(sent, response.delay_s, response.lag_s)
+    behind = lagged(sent, response)
     flat = _smoothed(behind.reshape(len(grid_s), -1), grid_s)
     columns = [np.interp(recording.time_s, grid_s, column) for column in flat.T]
     return np.stack(columns, axis=1).reshape(recording.sent_pa.shape)
@@ -104,16 +105,24 @@ def _smoothed(columns: Array, grid_s: Array) -> Array:
     return mean
 
 
-def settled(time_s: Array, measured_pa: Array, tip_m: Array) -> bool:
+def settled(
+    time_s: Array,
+    measured_pa: Array,
+    tip_m: Array,
+    apart_s: float = AVERAGED_S,
+    settled_pa: float = SETTLED_PA,
+) -> bool:
     """Whether measured pressures (samples, ...) and tip (samples, 3) have come to rest at the end.
 
-    Means over the last swing and the one before; what was not measured does not count.
+    Means over the last swing and over one ``apart_s`` before it; pressures that differ by more than
+    ``settled_pa`` have not. What was not measured does not count.
     """
     late = time_s > time_s[-1] - AVERAGED_S
-    before = (time_s > time_s[-1] - 2.0 * AVERAGED_S) & ~late
-    if time_s[-1] - time_s[0] < 1.9 * AVERAGED_S:
+    before_s = time_s + apart_s
+    before = (before_s > time_s[-1] - AVERAGED_S) & (before_s <= time_s[-1])
+    if time_s[-1] - time_s[0] < 0.95 * (AVERAGED_S + apart_s):
         return False
-    limits = ((measured_pa.reshape(len(time_s), -1), _SETTLED_PA), (tip_m, _SETTLED_M))
+    limits = ((measured_pa.reshape(len(time_s), -1), settled_pa), (tip_m, _SETTLED_M))
     return not any(
         np.any(np.abs(_mean(values[late]) - _mean(values[before])) > limit)
         for values, limit in limits
@@ -151,7 +160,8 @@ def find_rests(recording: Recording, response: Response = _RESPONSE) -> Rests:
     ``response`` is what lies between a pressure that is sent and the one that acts.
     """
     acting = acting_pa(recording, response).reshape(len(recording.time_s), -1)
-    fast = np.abs(np.diff(acting, axis=0)).max(axis=1) > SLOW_PA_S * np.diff(recording.time_s)
+    slow_pa_s = min(SLOW_PA_S, _LATE_PA / max(response.slower_lag_s, 1e-3))
+    fast = np.abs(np.diff(acting, axis=0)).max(axis=1) > slow_pa_s * np.diff(recording.time_s)
     found: list[tuple[int, Array, Array, int]] = []
     borders = [0, *(np.flatnonzero(fast) + 1).tolist(), len(recording.time_s)]
     restless = 0

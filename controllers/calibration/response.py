@@ -1,27 +1,25 @@
-"""How the arm answers: dead time and lag of its valves, frequency and damping of its lowest mode.
+"""How the arm answers: dead time and lags of its valves, frequency and damping of its lowest mode.
 
-Two fits. The pressures measured are the pressures sent, through a play, a dead time and a lag of
-first order. The tip after a step is where the map says, through an oscillator of second order; the
-map's own error is taken out by an offset and a gain for every step.
+The valves are fitted in :mod:`pneuarm.controllers.calibration.valve_fit`. The tip after a step is
+where the map says for the pressures measured, through an oscillator of second order; the map's own
+error is taken out by an offset and a gain for every step.
 
 Either is taken only where it explains what was measured: a feedback that trusts a mode which was
-not seen, or a dead time that stands for something else, swings for ever.
+not seen swings for ever.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from pneuarm.controllers.arm.arm import Arm, Array, Response
-from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.frames import Frames
 from pneuarm.controllers.calibration.hysteresis import play_outputs
 from pneuarm.controllers.calibration.model import TipModel
 from pneuarm.controllers.calibration.parameters import start_of
 from pneuarm.controllers.calibration.recording import STILL_PA_S, Recording
+from pneuarm.controllers.calibration.valve_fit import ValvesFit, fit_valves, on_bound, solved
 from pneuarm.controllers.calibration.valves import STEP_S, lagged, on_grid
 
 #: A stretch of motion this near the fastest one of the recording is a step.
@@ -29,20 +27,17 @@ _FAST_SHARE = 0.7
 #: How long after the beginning of a step the tip is looked at, and the pressures may move (s).
 _WINDOW_S, _MOVING_S = 2.0, 0.8
 #: A step must move the tip this far (m) to tell a mode from noise.
-_MOVED_M = 0.01
+_MOVED_M = 0.006
 
-_VALVES_LOW, _VALVES_HIGH = (0.0, 1e-4, 0.0), (0.45, 4.0, 20.0)
 _MODE_LOW, _MODE_HIGH = (0.05, 0.005), (50.0, 1.5)
 #: Frequencies (Hz) and damping ratios from which the mode is looked for.
 _MODES_HZ, _DAMPINGS = np.geomspace(0.3, 15.0, 18), (0.05, 0.2, 0.6)
 
-#: Of what the pressures move, the valves' model may leave this share, and of the tip's swing about
-#: its way the mode's may leave that one.
-_VALVES_LEFT, _MODE_LEFT = 0.08, 0.4
-#: Filling and exhausting may differ by this factor in their lag.
-_LOPSIDED = 1.5
-#: A dead time beyond this (s) and beyond this share of the lag is no dead time.
-_DELAY_S, _DELAY_SHARE = 0.06, 1.0
+#: Of how the tip swings about its way, be that a little late (at most so many points of the grid),
+#: the mode's model may leave this share.
+_MODE_LEFT, _LATEST = 0.4, 8
+#: What is damped more does not swing.
+_MOST_DAMPED = 0.7
 #: A deviation may be this share of its frequency.
 _UNSURE = 0.1
 
@@ -57,22 +52,8 @@ class StepAnswer:
 
 
 @dataclass(frozen=True)
-class ValvesFit:
-    """Dead time and lag as fitted, the width of the valves' loop, their deviations.
-
-    ``why_not`` says why they are not the valves' own, or is empty.
-    """
-
-    delay_s: float
-    lag_s: float
-    play_pa: float
-    sd: Array
-    why_not: str
-
-
-@dataclass(frozen=True)
 class ResponseFit:
-    """The response, the standard deviations of its four numbers, and the steps behind it.
+    """The response, the standard deviations of its numbers, and the steps behind its mode.
 
     What was not identified is as it was, with a deviation of 0; ``not_identified`` says what and
     why, one sentence each.
@@ -85,49 +66,40 @@ class ResponseFit:
 
 
 def fit_response(
-    arm: Arm, recording: Recording, frames: Frames, valves: "ValvesFit | None" = None
+    arm: Arm, recording: Recording, frames: Frames, valves: ValvesFit | None = None
 ) -> ResponseFit:
-    """Fit the response of ``arm``, whose map and ``frames`` of measurement are fitted already.
-
-    Raises CalibrationError for a recording without a step.
-    """
+    """Fit the response of ``arm``, whose map and ``frames`` of measurement are fitted already."""
     grid, nominal = _Grid(recording), arm.response
     valves = valves or fit_valves(recording, nominal)
-    windows = grid.steps()
-    # The pressures in the chambers are measured, whatever the valves do; else they are modelled.
-    chambers = grid.measured_pa
-    if not np.isfinite(chambers).all():
-        chambers = lagged(grid.sent_pa, valves.delay_s, valves.lag_s)
-    acting, _ = play_outputs(chambers, arm.per_section("hysteresis_pa"))
-    model, start = TipModel(arm), start_of(arm)
-    static_m = [frames.measured_m(model.poses(acting[window], start)) for window in windows]
-    mode = _fit_mode(grid, windows, static_m, nominal)
-    reasons = [
-        f"{what} not identified: {why}; feedback keeps the nominal {what}"
+    mode = _mode_of(arm, grid, frames, valves)
+    response, sd = nominal, _NO_DEVIATION
+    if not valves.why_not:
+        delay_s, filling_s, exhausting_s = valves.sd.tolist()
+        response = valves.response
+        sd = replace(sd, delay_s=delay_s, filling_lag_s=filling_s, exhausting_lag_s=exhausting_s)
+    if not mode.why_not:
+        response = _swinging_as(response, mode.values)
+        sd = _swinging_as(sd, mode.sd)
+    reasons = tuple(
+        f"{what} not identified: {why}; what was configured of it stays"
         for what, why in (("valve response", valves.why_not), ("mode", mode.why_not))
         if why
-    ]
-    delay_s, lag_s = (
-        (nominal.delay_s, nominal.lag_s) if valves.why_not else (valves.delay_s, valves.lag_s)
     )
-    own = (nominal.mode_hz, nominal.damping_ratio) if mode.why_not else mode.values
-    return ResponseFit(
-        _response(delay_s, lag_s, *own),
-        _response(
-            *(np.zeros(2) if valves.why_not else valves.sd[:2]),
-            *(np.zeros(2) if mode.why_not else mode.sd),
-        ),
-        mode.steps,
-        tuple(reasons),
-    )
+    return ResponseFit(response, sd, mode.steps, reasons)
 
 
-def _response(*values: float) -> Response:
-    return Response(*(float(value) for value in values))
+_NO_DEVIATION = Response(
+    delay_s=0.0, filling_lag_s=0.0, exhausting_lag_s=0.0, mode_hz=0.0, damping_ratio=0.0
+)
+
+
+def _swinging_as(response: Response, values: Array) -> Response:
+    mode_hz, damping_ratio = values.tolist()
+    return replace(response, mode_hz=mode_hz, damping_ratio=damping_ratio)
 
 
 _NO_STEP = (
-    "the arm was never moved by a step: pressures must change quickly, the tip by 10 mm or more, "
+    "the arm was never moved by a step: pressures must change quickly, the tip by 6 mm or more, "
     f"and then rest for {_WINDOW_S:g} s, to show how it swings"
 )
 
@@ -158,112 +130,6 @@ class _Grid:
         return windows
 
 
-def fit_valves(recording: Recording, nominal: Response) -> ValvesFit:
-    """Fit dead time, lag and play of the valves to the pressures sent and measured."""
-    finite = np.isfinite(recording.measured_pa).reshape(len(recording.time_s), -1).all(axis=1)
-    none = ValvesFit(nominal.delay_s, nominal.lag_s, 0.0, np.zeros(3), "")
-    if not finite.all():
-        return _refused(none, "the device measured no pressures, without them no lag is seen")
-    sent, measured = (
-        on_grid(recording.time_s, each)[1] for each in (recording.sent_pa, recording.measured_pa)
-    )
-    moved_pa = float(np.sqrt(np.mean(np.var(sent, axis=0))))
-    if moved_pa < STILL_PA_S:
-        return _refused(none, "the pressures hardly changed")
-
-    def rows(x: Array) -> Array:
-        played, _ = play_outputs(sent, np.array([[x[2] * 1e3]]))
-        return (lagged(played, x[0], x[1]) - measured).reshape(-1) * 1e-3
-
-    starts = [
-        np.array([delay_s, lag_s, 0.5])
-        for delay_s, lag_s in ((max(nominal.delay_s, 1e-3), max(nominal.lag_s, 1e-3)), (0.01, 0.1))
-    ]
-    tries = [_solved(rows, start, _VALVES_LOW, _VALVES_HIGH) for start in starts]
-    x, sd = min(tries, key=lambda each: float(np.sum(rows(each[0]) ** 2)))
-    played, _ = play_outputs(sent, np.array([[x[2] * 1e3]]))
-    left = 1e3 * float(np.sqrt(np.mean(rows(x) ** 2))) / moved_pa
-    found = ValvesFit(float(x[0]), float(x[1]), 1e3 * float(x[2]), sd, "")
-    return _refused(found, _why_no_valves(found, left, _lags(played, measured, float(x[0]))))
-
-
-def _refused(found: ValvesFit, why: str) -> ValvesFit:
-    return ValvesFit(found.delay_s, found.lag_s, found.play_pa, found.sd, why)
-
-
-def _lags(sent: Array, measured: Array, delay_s: float) -> tuple[float, float]:
-    """Lags (s) of filling and of exhausting: of the pressure's rate against what is missing.
-
-    Filling is a rise, or, where there is vacuum, what leads away from ambient: the two of which
-    the lags differ more.
-    """
-    late = lagged(sent, delay_s, 0.0)
-    width = max(1, round(0.03 / STEP_S))
-    rate = (measured[2 * width :] - measured[: -2 * width]) / (2 * width * STEP_S)
-    missing = (late - measured)[width:-width]
-    large = np.abs(missing) > 0.1 * np.abs(missing).max(initial=1.0)
-    away = missing * np.sign(late[width:-width]) > 0.0
-    pairs = [
-        (
-            _lag(rate[large & way], missing[large & way]),
-            _lag(rate[large & ~way], missing[large & ~way]),
-        )
-        for way in (missing > 0.0, away)
-    ]
-    return max(pairs, key=lambda lags: max(lags) / max(min(lags), 1e-4))
-
-
-def _lag(rates: Array, missing: Array) -> float:
-    """Lag (s) under which what is missing goes away at these rates."""
-    return float(np.sum(missing**2) / max(float(np.sum(missing * rates)), 1e-9))
-
-
-def _why_no_valves(found: ValvesFit, left: float, lags: tuple[float, float]) -> str:
-    filling, exhausting = (1e3 * lag for lag in lags)
-    if max(lags) > _LOPSIDED * min(lags) and max(lags) > 0.1:
-        return (
-            f"the valves fill with a lag of {filling:.0f} ms and exhaust with one of "
-            f"{exhausting:.0f} ms, and one lag stands for both"
-        )
-    if left > _VALVES_LEFT:
-        return (
-            f"a dead time and a lag leave {100.0 * left:.0f} % of what the pressures moved "
-            f"unexplained ({100.0 * _VALVES_LEFT:.0f} % at most)"
-        )
-    values = np.array([found.delay_s, found.lag_s, 1e-3 * found.play_pa])
-    on_bound = _on_bound(values, _VALVES_LOW, _VALVES_HIGH, ("delay_ms", "lag_ms", "the play"))
-    if on_bound:
-        return on_bound
-    if found.delay_s > max(_DELAY_S, _DELAY_SHARE * found.lag_s):
-        return (
-            f"delay_ms = {1e3 * found.delay_s:.0f} beside lag_ms = {1e3 * found.lag_s:.0f} is no "
-            "dead time of a valve"
-        )
-    return ""
-
-
-def _on_bound(
-    values: Array, low: Sequence[float], high: Sequence[float], names: Sequence[str]
-) -> str:
-    """Name what ended on a bound that is not 0."""
-    for value, least, largest, name in zip(values, low, high, names, strict=True):
-        if value > 0.98 * largest or (least > 1e-3 and value < 1.02 * least):
-            return f"{name} ended on its bound"
-    return ""
-
-
-def _solved(
-    rows: Callable[[Array], Array], start: Array, low: Sequence[float], high: Sequence[float]
-) -> tuple[Array, Array]:
-    """Least squares within bounds; the solution and its standard deviations."""
-    inside = np.clip(start, np.array(low) + 1e-9, np.array(high) - 1e-9)
-    found = least_squares(rows, inside, bounds=(low, high), x_scale=np.maximum(inside, 1e-3))
-    freedom = max(1, len(found.fun) - len(start))
-    variance = 2.0 * found.cost / freedom
-    covariance = np.linalg.pinv(found.jac.T @ found.jac) * variance
-    return found.x, np.sqrt(np.diag(covariance))
-
-
 @dataclass(frozen=True)
 class _ModeFit:
     """Frequency (Hz) and damping ratio, their deviations, the steps; why they are not taken."""
@@ -274,23 +140,35 @@ class _ModeFit:
     why_not: str
 
 
-def _fit_mode(
-    grid: _Grid, windows: list[slice], static_m: list[Array], nominal: Response
-) -> _ModeFit:
-    """Fit the lowest mode to the tip's way after every step."""
-    moved = [
-        (static @ direction, grid.tip_m[window] @ direction)
-        for window, static in zip(windows, static_m, strict=True)
-        if np.ptp(static @ (direction := _direction(static))) > _MOVED_M
-    ]
-    if not moved:
-        raise CalibrationError(_NO_STEP)
+#: A step: the tip (points,) along its way where the map has it, and measured.
+_Moved = tuple[Array, Array]
 
+
+def _mode_of(arm: Arm, grid: _Grid, frames: Frames, valves: ValvesFit) -> _ModeFit:
+    """Fit the lowest mode to the tip's way after every step."""
+    # The pressures in the chambers are measured, whatever the valves do; else they are modelled.
+    chambers = grid.measured_pa
+    if not np.isfinite(chambers).all():
+        chambers = lagged(grid.sent_pa, valves.response)
+    acting, _ = play_outputs(chambers, arm.per_section("hysteresis_pa"))
+    model, start = TipModel(arm), start_of(arm)
+    moved = list[_Moved]()
+    for window in grid.steps():
+        static = frames.measured_m(model.poses(acting[window], start))
+        direction = _direction(static)
+        if np.ptp(static @ direction) > _MOVED_M:
+            moved.append((static @ direction, grid.tip_m[window] @ direction))
+    if not moved:
+        return _ModeFit(np.zeros(2), np.zeros(2), (), _NO_STEP)
+    return _fit_mode(moved, arm.response)
+
+
+def _fit_mode(moved: list[_Moved], nominal: Response) -> _ModeFit:
     def answers(x: Array) -> list[StepAnswer]:
         return [_scaled(_swinging(static, x[0], x[1]), measured) for static, measured in moved]
 
     def rows(x: Array) -> Array:
-        return np.concatenate([1e3 * (a.modelled_m - a.measured_m) for a in answers(x)])
+        return _left_mm(answers(x))
 
     def cost(x: Array) -> float:
         return float(np.sum(rows(x) ** 2))
@@ -298,12 +176,29 @@ def _fit_mode(
     grid_of = [np.array([hz, damping]) for hz in _MODES_HZ for damping in _DAMPINGS]
     near = np.array([nominal.mode_hz, nominal.damping_ratio])
     starts = sorted([near, *grid_of], key=cost)[:3]
-    tries = [_solved(rows, start, _MODE_LOW, _MODE_HIGH) for start in starts]
+    tries = [solved(rows, start, _MODE_LOW, _MODE_HIGH) for start in starts]
     x, sd = min(tries, key=lambda each: cost(each[0]))
-    without = [_scaled(static, measured) for static, measured in moved]
-    swing = float(sum(np.sum((a.modelled_m - a.measured_m) ** 2) for a in without)) * 1e6
-    left = float(np.sqrt(cost(x) / max(swing, 1e-12)))
+    left = float(np.sqrt(cost(x) / max(_swing_mm2(moved), 1e-12)))
     return _ModeFit(x, sd, tuple(answers(x)), _why_no_mode(x, sd, left))
+
+
+def _left_mm(answers: list[StepAnswer]) -> Array:
+    return np.concatenate([1e3 * (a.modelled_m - a.measured_m) for a in answers])
+
+
+def _swing_mm2(moved: list[_Moved]) -> float:
+    """Squares of what is left without a mode, the tip being as late as is best.
+
+    A frequency far above all that moved makes the tip late, and nothing else.
+    """
+    return min(
+        float(np.sum(_left_mm([_scaled(_late(way, points), tip) for way, tip in moved]) ** 2))
+        for points in range(_LATEST + 1)
+    )
+
+
+def _late(values: Array, points: int) -> Array:
+    return np.concatenate([np.repeat(values[:1], points), values[: len(values) - points]])
 
 
 def _scaled(modelled: Array, measured: Array) -> StepAnswer:
@@ -315,9 +210,11 @@ def _scaled(modelled: Array, measured: Array) -> StepAnswer:
 
 
 def _why_no_mode(x: Array, sd: Array, left: float) -> str:
-    on_bound = _on_bound(x, _MODE_LOW, _MODE_HIGH, ("mode_hz", "damping_ratio"))
-    if on_bound:
-        return f"{on_bound} at mode_hz = {x[0]:.3g}, damping_ratio = {x[1]:.3g}"
+    bound = on_bound(x, _MODE_LOW, _MODE_HIGH, ("mode_hz", "damping_ratio"))
+    if bound:
+        return f"{bound} at mode_hz = {x[0]:.3g}, damping_ratio = {x[1]:.3g}"
+    if x[1] > _MOST_DAMPED:
+        return f"what fits best does not swing: mode_hz = {x[0]:.3g}, damping_ratio = {x[1]:.2g}"
     if left > _MODE_LEFT:
         return (
             f"a mode of {x[0]:.2g} Hz explains too little of how the tip swings after a step: "

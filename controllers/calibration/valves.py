@@ -1,12 +1,13 @@
 """What valves make of the pressures they are sent: a dead time and a lag, on an even grid."""
 
+from itertools import accumulate
+
 import numpy as np
-from scipy.signal import lfilter
 
-from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.arm import Array, Response
 
-#: The grid (s).
-STEP_S = 0.005
+#: The grid (s): that of the recordings.
+STEP_S = 0.01
 
 
 def on_grid(time_s: Array, values: Array) -> tuple[Array, Array]:
@@ -17,16 +18,30 @@ def on_grid(time_s: Array, values: Array) -> tuple[Array, Array]:
     return grid_s, np.stack(columns, axis=1).reshape(-1, *values.shape[1:])
 
 
-def lagged(sent_pa: Array, delay_s: float, lag_s: float) -> Array:
-    """Pressures (points, ...) after a dead time and a lag of first order, on the grid."""
+def delayed(sent_pa: Array, delay_s: float) -> Array:
+    """Pressures (points, ...) after a dead time, on the grid; nothing was sent before the first."""
     steps = delay_s / STEP_S
     whole = int(steps)
-    padded = np.concatenate([np.repeat(sent_pa[:1], whole + 1, axis=0), sent_pa])
-    late = padded[1 : len(sent_pa) + 1] * (1.0 - steps + whole)
-    late = late + padded[: len(sent_pa)] * (steps - whole)
-    kept = np.exp(-STEP_S / max(lag_s, 1e-6))
+    padded = np.concatenate([np.zeros((whole + 1, *sent_pa.shape[1:])), sent_pa])
+    late: Array = padded[1 : len(sent_pa) + 1] * (1.0 - steps + whole)
+    return late + padded[: len(sent_pa)] * (steps - whole)
+
+
+def lagged(sent_pa: Array, response: Response) -> Array:
+    """Pressures (points, ...) behind dead time and lags of :class:`Response`, on the grid.
+
+    The chambers were vented before the first point.
+    """
+    late = delayed(sent_pa, response.delay_s)
     # What comes in between two points of the grid is their mean.
-    entering = 0.5 * (late + np.concatenate([late[:1], late[:-1]]))
-    start = [kept * late[0]]
-    behind: Array = lfilter([1.0 - kept], [1.0, -kept], entering, axis=0, zi=np.array(start))[0]
-    return behind
+    entering = 0.5 * (late + np.concatenate([np.zeros_like(late[:1]), late[:-1]]))
+    filling, exhausting = response.left(STEP_S)
+
+    def follow(now: float, toward: float) -> float:
+        return toward + (filling if toward > now else exhausting) * (now - toward)
+
+    columns = [
+        np.fromiter(accumulate(column.tolist(), follow, initial=0.0), float)[1:]
+        for column in entering.reshape(len(entering), -1).T
+    ]
+    return np.stack(columns, axis=1).reshape(sent_pa.shape)

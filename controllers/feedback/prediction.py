@@ -62,7 +62,7 @@ def discrete(response: Response, period_s: float) -> tuple[Array, Array]:
     """One tick of lag and mode, exact for an input that stays: ``x' = step x + input u``."""
     omega = 2.0 * math.pi * response.mode_hz
     rates = np.zeros((4, 4))
-    rates[0, [0, 3]] = -1.0 / response.lag_s, 1.0 / response.lag_s
+    rates[0, [0, 3]] = -1.0 / response.slower_lag_s, 1.0 / response.slower_lag_s
     rates[1, 2] = 1.0
     rates[2, :3] = omega**2, -(omega**2), -2.0 * response.damping_ratio * omega
     whole = expm(rates * period_s)

@@ -1,8 +1,15 @@
-"""Pressures inside their range, and how fast they may change, through the map of the actuation."""
+"""Pressures inside their range, and how fast they may change, through the map of the actuation.
+
+They may change as fast as the slew limit says, and no faster than the valves can follow: a tip that
+is commanded somewhere else than where the air can bring it comes to another place in the end, for
+the chambers remember their way.
+"""
 
 import casadi as ca
+import numpy as np
 
 from pneuarm.controllers.actuation.pressure_map import symbolic_pressures
+from pneuarm.controllers.actuation.valve_lead import largest_rates_pa_s
 from pneuarm.controllers.arm.arm import Arm
 from pneuarm.controllers.limits.limit import Limit, column
 
@@ -21,7 +28,10 @@ class PressureLimit(Limit):
         super().__init__(arm)
         self._low = column(arm.per_chamber("pressure_min_pa"))
         self._high = column(arm.per_chamber("pressure_max_pa"))
-        self._slew = column(arm.per_chamber("pressure_slew_max_pa_s"))
+        slew = arm.per_chamber("pressure_slew_max_pa_s")
+        rising, falling = largest_rates_pa_s(arm.response)
+        self._rising = column(np.minimum(slew, rising))
+        self._falling = column(np.minimum(slew, falling))
         #: Metres a pascal near zero pressure.
         self._metres = column(arm.per_chamber("lengthening_m_per_pa"))
 
@@ -43,12 +53,13 @@ class PressureLimit(Limit):
     def rate_share(self, lengths: ca.SX, rates: ca.SX) -> ca.SX:
         """Largest share of its slew limit that a chamber uses up, to first order."""
         jacobian = ca.jacobian(symbolic_pressures(self._arm, lengths), lengths)
-        return ca.norm_inf((jacobian @ rates) / self._slew) / _SLEW_SHARE
+        change = jacobian @ rates
+        return ca.mmax(ca.fmax(change / self._rising, -change / self._falling)) / _SLEW_SHARE
 
     def step_slack(self, before: ca.SX, after: ca.SX, dt: ca.SX) -> ca.SX:
         """What a step leaves of the slew limit (n_chambers,), in metres, exactly."""
         change = symbolic_pressures(self._arm, after) - symbolic_pressures(self._arm, before)
-        return self._metres * (self._slew * dt - ca.fabs(change))
+        return self._metres * ca.fmin(self._rising * dt - change, self._falling * dt + change)
 
     def contradiction(self) -> str:
         """Nothing: zero is in the range of every section, and a loaded arm hangs at zero."""

@@ -64,7 +64,7 @@ def lead_of(response: Response) -> Lead:
     steps wherever the jerk has one.
     """
     omega = 2.0 * math.pi * response.mode_hz
-    ahead_s = response.delay_s + response.lag_s
+    ahead_s = response.delay_s + response.slower_lag_s
     return Lead(ahead_s, 2.0 * response.damping_ratio / omega, omega**-2)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pneuarm.controllers.actuation.pressure_map import length_bounds_m
-from pneuarm.controllers.arm.arm import Arm, Array
+from pneuarm.controllers.arm.arm import Arm, Array, Response
 from pneuarm.controllers.kinematics.compiled import CompiledKinematics
 from pneuarm.controllers.kinematics.constant_curvature import (
     lengths_from_shapes,
@@ -40,6 +40,7 @@ _QUICK: dict[str, Any] = {
     "length_acceleration_max_m_s2": 1e3,
     "pressure_slew_max_pa_s": 1e9,
 }
+_NO_LAG = Response(filling_lag_s=0.0, exhausting_lag_s=0.0)
 _STEPS = 80
 _DIRECTIONS, _OUTER_STARTS = 1500, 2
 _RESTS_M = 2e-6  # a tip that moves less in one step is at rest
@@ -73,7 +74,7 @@ class SearchedRegion:
         self._kinematics = CompiledKinematics(arm)
         # In a search the only rate limit is the length of its steps.
         quick = tuple(replace(section, **_QUICK) for section in arm.sections)
-        self._chambers = CommandedChambers(replace(arm, sections=quick))
+        self._chambers = CommandedChambers(replace(arm, sections=quick, response=_NO_LAG))
 
     def contains(self, positions_m: Array) -> NDArray[np.bool_]:
         """Membership of positions ``(..., 3)``, one search each."""

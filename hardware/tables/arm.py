@@ -1,7 +1,7 @@
 """The arm: its sections and their limits."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -141,23 +141,72 @@ class ResponseConfig(Table):
             description="dead time from the pressure sent to the first change in the chamber",
         ),
     ] = 5.0
-    lag_ms: Annotated[
+    filling_lag_ms: Annotated[
         float,
-        Field(ge=0, le=5000, description="time constant of the valve and chamber, first order"),
+        Field(
+            ge=1,
+            le=10000,
+            description=(
+                "first-order lag of valve and chamber while the pressure rises: the time in which "
+                "it goes 63 % of its way, after the dead time"
+            ),
+        ),
+    ] = 60.0
+    exhausting_lag_ms: Annotated[
+        float, Field(ge=1, le=10000, description="the same while the pressure falls")
     ] = 60.0
     mode_hz: Annotated[float, Field(gt=0, le=200, description="lowest bending mode of the arm")] = (
         2.2
     )
     damping_ratio: Annotated[float, Field(gt=0, le=2, description="of that mode")] = 0.15
+    lead_max_bar: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=10,
+            description=(
+                "how far a setpoint may run ahead of slow valves, besides what a lag of 80 ms asks "
+                "for: more is faster; less lets valves follow that are slower somewhere than their "
+                "lag, and the tip ends nearer to its target where no camera corrects it"
+            ),
+        ),
+    ] = 0.04
+
+    @model_validator(mode="before")
+    @classmethod
+    def _two_lags(cls, table: Any) -> Any:
+        """Say what to write for the one lag of before."""
+        if isinstance(table, dict) and "lag_ms" in table:
+            lag = table["lag_ms"]
+            raise ValueError(
+                f"lag_ms = {lag}: there is one lag for each direction now; write "
+                f"filling_lag_ms = {lag} and exhausting_lag_ms = {lag} in its place, or let "
+                "`pneuarm calibrate` measure them"
+            )
+        return table
 
     def response(self) -> Response:
         """Return the response in SI units."""
         return Response(
             delay_s=self.delay_ms * 1e-3,
-            lag_s=self.lag_ms * 1e-3,
+            filling_lag_s=self.filling_lag_ms * 1e-3,
+            exhausting_lag_s=self.exhausting_lag_ms * 1e-3,
             mode_hz=self.mode_hz,
             damping_ratio=self.damping_ratio,
+            lead_max_pa=self.lead_max_bar * BAR,
         )
+
+
+def with_two_lags(arm: dict[str, Any]) -> dict[str, Any]:
+    """Return a table of an arm with two lags, where it was recorded when there was one."""
+    response = arm.get("response")
+    if not isinstance(response, dict) or "lag_ms" not in response:
+        return arm
+    others = {key: value for key, value in response.items() if key != "lag_ms"}
+    lags = {"filling_lag_ms": response["lag_ms"], "exhausting_lag_ms": response["lag_ms"]}
+    # A lag of 0 was allowed; 1 ms is as good as none.
+    lags = {key: max(value, 1.0) for key, value in lags.items()}
+    return arm | {"response": lags | others}
 
 
 Triple = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]

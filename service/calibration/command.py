@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from pneuarm.controllers.calibration.calibrate import Calibration, calibrate
+from pneuarm.controllers.calibration.pace import Pace
 from pneuarm.controllers.calibration.plan import duration_s, plan
 from pneuarm.controllers.calibration.recording import Recording
+from pneuarm.hardware.tables.table import BAR
 from pneuarm.service.calibration import broken_off
 from pneuarm.service.calibration.drive import Progressed, ask, progress, record, require_tip
 from pneuarm.service.calibration.files import calibrated, require_folder, toml_text, write_whole
+from pneuarm.service.calibration.motion import first_moves, pace_after
 from pneuarm.service.calibration.page import page
 from pneuarm.service.calibration.recordings import read_logs, require_seen
 from pneuarm.service.calibration.values import (
@@ -28,6 +31,9 @@ from pneuarm.service.calibration.values import (
 from pneuarm.service.client.client import Client
 from pneuarm.service.configuration.configuration import Configuration, recorded
 from pneuarm.service.pictures.pyplot import pyplot
+
+#: Ramps up to this are told (Pa/s): those of the plan go faster.
+_UNHURRIED_PA_S = 5e4
 
 _TOML, _PAGE = "calibration.toml", "calibration.html"
 
@@ -57,24 +63,50 @@ def _live(arguments: argparse.Namespace) -> tuple[Configuration, Recording]:
     name = arguments.arm or "paper"
     with Client(name, arguments.connect, "calibrate", arguments.zenoh_config) as client:
         configuration = recorded(client.info().config_toml, "the daemon")
-        arm = configuration.build_arm()
-        moves, folder = plan(arm), arguments.out
+        folder = arguments.out
         so_far = broken_off.load(folder, configuration) if arguments.resume else Progressed()
         require_tip(client)
-        left = moves[so_far.moves_done :]
-        print(
-            f"arm {name} moves through {len(left)} places in {duration_s(left):.0f} s; keep its "
-            "workspace free; Ctrl-C ends it with the arm vented",
-            file=sys.stderr,
-            flush=True,
-        )
-        try:
-            recording = record(client, moves, arm.n_sections, progress(), ask, so_far)
-        except BaseException:
-            _keep(folder, configuration, so_far, len(moves))
-            raise
+        recording = _moved(client, configuration, so_far, folder)
     require_seen(recording)
     return configuration, recording
+
+
+def _moved(
+    client: Client, configuration: Configuration, so_far: Progressed, folder: Path
+) -> Recording:
+    """Go through all moves that are not done: the gentle ones, then those that follow from them."""
+    arm, (first, slowly) = configuration.build_arm(), first_moves(configuration)
+    _say(
+        f"arm {arm.name} moves: first by small steps, to see what its valves do, then through most "
+        "of its workspace; keep it free; Ctrl-C ends it with the arm vented"
+    )
+    if so_far.moves_done < len(first):
+        record(client, first, configuration, progress(), ask, so_far, slowly)
+    pace = pace_after(configuration, so_far.recording)
+    moves = [*first, *plan(arm, pace)]
+    left = moves[so_far.moves_done :]
+    _say(f"{len(left)} places in {duration_s(left):.0f} s or more{_because(pace)}")
+    try:
+        return record(client, moves, configuration, progress(), ask, so_far, pace)
+    except BaseException:
+        _keep(folder, configuration, so_far, len(moves))
+        raise
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _because(pace: Pace) -> str:
+    """Say why an arm moves slowly, where it does."""
+    if max(pace.rising_pa_s, pace.falling_pa_s) > _UNHURRIED_PA_S:
+        return ""
+    return (
+        f", with ramps up at {pace.rising_pa_s / BAR:.2f} bar/s and down at "
+        f"{pace.falling_pa_s / BAR:.2f} bar/s: the valves are slower than [arm.response] says, and "
+        "the monitors of the pressures expect what it says; a calibration of the arm as it is "
+        "found now will go faster"
+    )
 
 
 def _keep(

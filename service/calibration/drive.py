@@ -9,7 +9,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -21,19 +21,16 @@ from pneuarm.controllers.arm.errors import (
     ModeRefused,
     PneuarmError,
 )
-from pneuarm.controllers.calibration.plan import Move, duration_s
-from pneuarm.controllers.calibration.recording import (
-    AVERAGED_S,
-    Recording,
-    fresh_tips,
-    joined,
-    settled,
-)
+from pneuarm.controllers.calibration.pace import Pace
+from pneuarm.controllers.calibration.plan import KNOWN, Move, duration_s
+from pneuarm.controllers.calibration.recording import Recording, fresh_tips, joined
 from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.printable import name_of
+from pneuarm.service.calibration.motion import Pacer
 from pneuarm.service.calibration.recordings import recording_of
 from pneuarm.service.client.client import Client
+from pneuarm.service.configuration.configuration import Configuration
 
 _REFRESH_S = 0.02
 _POLL_S = 0.002
@@ -41,9 +38,11 @@ _POLL_S = 0.002
 _LOST_S = 1.0
 #: Whether an arm has settled is looked at this often (s).
 _LOOK_S = 0.1
+#: More states than tell whether an arm has settled.
+_TAIL = 500
 #: A move that is repeated is approached in this time (s), from wherever the arm holds.
 _AGAIN_S = 2.0
-#: An arm that is armed at less (Pa) was vented.
+#: An arm that is armed this far (Pa) from where the plan has it is elsewhere.
 _HELD_PA = 3000.0
 
 Progress = Callable[[float, float], None]
@@ -87,14 +86,16 @@ class Progressed:
 def record(
     client: Client,
     moves: Sequence[Move],
-    n_sections: int,
+    configuration: Configuration,
     tell: Progress,
     word: Word = lambda why: False,
     so_far: Progressed | None = None,
+    pace: Pace = KNOWN,
 ) -> Recording:
     """Arm, go through the moves that are not done, vent; return what was recorded on the way.
 
-    ``so_far`` is what was done before, and is kept up to date whatever happens. An interruption is
+    ``so_far`` is what was done before, and is kept up to date whatever happens. ``pace`` is that at
+    which a move is approached that did not begin where the plan has it. An interruption is
     told to ``word``, which says whether to arm again; where it does not, its error is raised.
     Whatever ends it early, Ctrl-C too, leaves the arm holding, then vented.
     """
@@ -103,7 +104,7 @@ def record(
     try:
         while so_far.moves_done < len(moves):
             try:
-                _go_on(client, moves, n_sections, tell, so_far)
+                _go_on(client, moves, configuration, tell, so_far, pace)
             except (ModeRefused, CalibrationError) as error:
                 _again(client, error, word)
     finally:
@@ -133,22 +134,31 @@ def _again(client: Client, error: PneuarmError, word: Word) -> None:
 
 
 def _go_on(
-    client: Client, moves: Sequence[Move], n_sections: int, tell: Progress, so_far: Progressed
+    client: Client,
+    moves: Sequence[Move],
+    configuration: Configuration,
+    tell: Progress,
+    so_far: Progressed,
+    pace: Pace,
 ) -> None:
     """Go through the moves that are left; what was recorded is kept, however it ends."""
-    states = [client.state()]
+    states, pacer = [client.state()], Pacer(configuration)
+    n_sections = len(configuration.arm.sections)
     start = np.array(states[0].pressure_sent_pa).reshape(n_sections, 3)
     client.events()
     whole_s = duration_s(list(moves))
-    repeated = bool(np.abs(start).max() > _HELD_PA)
+    first = so_far.moves_done
+    planned = moves[first - 1].pressures_pa if first else np.zeros_like(start)
+    elsewhere = bool(np.abs(start - planned).max() > _HELD_PA)
     try:
-        for number in range(so_far.moves_done, len(moves)):
+        for number in range(first, len(moves)):
             move = moves[number]
-            if repeated:  # it holds somewhere: no step from there
-                move = Move(move.pressures_pa, max(move.ramp_s, _AGAIN_S), move.rest_s)
-                repeated = False
+            if number == first and elsewhere:  # no step from there, and no ramp that is too fast
+                again_s = max(_AGAIN_S, pace.ramp_s(move.pressures_pa - start))
+                move = replace(move, ramp_s=max(move.ramp_s, again_s))
             done_s = duration_s(list(moves[:number]))
-            _follow(client, move, start, states, partial(_tell_on, tell, done_s, whole_s))
+            pacer.begin(move)
+            _follow(client, move, start, states, pacer, partial(_tell_on, tell, done_s, whole_s))
             start, so_far.moves_done = move.pressures_pa, number + 1
     finally:
         if len(states) > 1:
@@ -164,17 +174,17 @@ def _follow(
     move: Move,
     start: Array,
     states: list[pb.ArmState],
+    pacer: Pacer,
     tell: Callable[[float], None],
 ) -> None:
     """Send one move until it is over; its states are appended."""
-    began_s = sent_s = looked_s = time.monotonic()
+    before_s = sent_s = looked_s = time.monotonic()
     while True:
         now_s = time.monotonic()
-        elapsed_s = now_s - began_s
-        if elapsed_s >= move.longest_s:
-            return
+        pacer.go_on(now_s - before_s)
+        before_s, elapsed_s = now_s, pacer.elapsed_s
         if elapsed_s >= move.duration_s and now_s >= looked_s:
-            if _settled(states):
+            if move.over(elapsed_s, *_newest(states, move.looked_at_s)):
                 return
             looked_s = now_s + _LOOK_S
         if now_s >= sent_s:
@@ -185,18 +195,20 @@ def _follow(
         if state.sequence != states[-1].sequence:
             _require_going_on(client, state)
             states.append(state)
+            seen_s = 1e-9 * (state.time_unix_ns - states[0].time_unix_ns)
+            pacer.see(seen_s, [*state.pressure_sent_pa], [*state.pressure_measured_pa])
         tell(min(elapsed_s, move.duration_s))
         time.sleep(_POLL_S)
 
 
-def _settled(states: list[pb.ArmState]) -> bool:
-    """Whether the newest states show an arm at rest."""
-    ends_ns = states[-1].time_unix_ns - int(2.1e9 * AVERAGED_S)
-    tail = [state for state in states[-200:] if state.time_unix_ns > ends_ns]
+def _newest(states: list[pb.ArmState], seconds: float) -> tuple[Array, Array, Array]:
+    """Times, measured pressures and measured tips of the newest states."""
+    ends_ns = states[-1].time_unix_ns - int(1.05e9 * seconds)
+    tail = [state for state in states[-_TAIL:] if state.time_unix_ns > ends_ns]
     ticks = ticks_from_states(tail, tail[-1].n_sections)
     time_s = (ticks["time_unix_ns"] - ticks["time_unix_ns"][0]) * 1e-9
     tips = fresh_tips(ticks["tip_measured_position_m"], ticks["tip_measured_age_s"])
-    return settled(time_s, ticks["pressure_measured_pa"], tips)
+    return time_s, ticks["pressure_measured_pa"], tips
 
 
 def _require_going_on(client: Client, state: pb.ArmState) -> None:

@@ -34,7 +34,7 @@ def calibrated(configuration: Configuration, calibration: Calibration) -> Config
         tables[configuration.device.table]["arm"] = configuration.arm.model_dump()
     sections = zip(tables["arm"]["sections"], calibration.arm.sections, strict=True)
     tables["arm"]["sections"] = [old | _section(section) for old, section in sections]
-    tables["arm"]["response"] = _response(calibration.arm.response)
+    tables["arm"]["response"] |= _response(calibration.arm.response)
     if calibration.fit.in_world:
         tables["frames"] |= frames_table(configuration.frames, calibration.fit.frames)
     return check(tables, "calibration.toml")
@@ -57,7 +57,8 @@ def _section(section: Section) -> dict[str, Any]:
 def _response(response: Response) -> dict[str, float]:
     return {
         "delay_ms": _rounded(response.delay_s * 1e3),
-        "lag_ms": _rounded(response.lag_s * 1e3),
+        "filling_lag_ms": _rounded(response.filling_lag_s * 1e3),
+        "exhausting_lag_ms": _rounded(response.exhausting_lag_s * 1e3),
         "mode_hz": _rounded(response.mode_hz),
         "damping_ratio": _rounded(response.damping_ratio),
     }

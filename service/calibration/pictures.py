@@ -33,7 +33,7 @@ def pictures(calibration: Calibration) -> dict[str, bytes]:
             "Hysteresis: one chamber moved alone, up and down. The tip's way in the direction of "
             "the chamber; the width of the loop is what the fitted play gives back."
         ] = _picture(_hysteresis, calibration, (11, 3.6 * -(-len(_loops(calibration)) // 3)))
-    if calibration.response is not None:
+    if calibration.response.steps:
         rows = -(-min(6, len(calibration.response.steps)) // 3)
         drawn[
             "Steps of the pressure: the tip along its way, measured and as the fitted mode swings. "
@@ -149,8 +149,6 @@ def _hysteresis(figure: Any, calibration: Calibration) -> None:
 
 
 def _steps(figure: Any, calibration: Calibration) -> None:
-    if calibration.response is None:
-        return
     steps = sorted(calibration.response.steps, key=lambda step: -float(np.ptp(step.measured_m)))[:6]
     columns = min(3, len(steps))
     every = figure.subplots(-(-len(steps) // columns), columns, squeeze=False).reshape(-1)

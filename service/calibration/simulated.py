@@ -13,7 +13,7 @@ from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.arm.errors import CalibrationError
 from pneuarm.controllers.calibration.calibrate import calibrate
 from pneuarm.controllers.calibration.plan import Move, duration_s, plan
-from pneuarm.controllers.calibration.recording import Recording, settled
+from pneuarm.controllers.calibration.recording import Recording
 from pneuarm.controllers.geometry.rotations import rotation_from_quaternion, rotation_from_vector
 from pneuarm.controllers.targets.targets import PressuresTarget
 from pneuarm.hardware.interface import Hardware
@@ -22,6 +22,7 @@ from pneuarm.logs.rings.tick import tick_dtype
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.calibration.drive import progress
 from pneuarm.service.calibration.files import calibrated
+from pneuarm.service.calibration.motion import Pacer, first_moves, pace_after
 from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.control.loop import Loop, LoopSettings, Timing
 from pneuarm.service.devices import registry as backends
@@ -31,10 +32,11 @@ from pneuarm.service.processes.pipe import Command, Heartbeat, RequestMode, SetT
 
 _PERIOD_NS = 4_000_000
 _SAMPLE_TICKS = 3
+#: Whether a move is over is looked at this often.
+_LOOK_TICKS = 25
+_SAMPLE_S = 1e-9 * _PERIOD_NS * _SAMPLE_TICKS
 _REFRESH_TICKS = 5
 _NOISE_M, _NOISE_RAD = 1e-4, 2e-3
-#: Samples that are looked at to see whether the arm has settled.
-_TAIL = 75
 _READY_TICKS = 1000
 _FOREVER = Timeouts(target_s=1.0, arming_s=1e6, hold_s=1e6, full_disk_vent_s=1e6)
 
@@ -96,24 +98,41 @@ def record_simulated(configuration: Configuration, device: Hardware | None = Non
     """
     run = _Run(configuration, device or backends.build(configuration, configuration.build_arm()))
     run.activate()
-    rng, rows = np.random.default_rng(0), list[Sample]()
-    moves, start = plan(run.arm), np.zeros((run.arm.n_sections, 3))
+    rows, rng, pacer = list[Sample](), np.random.default_rng(0), Pacer(configuration)
+    _go(run, first_moves(configuration)[0], pacer, rows, rng)
+    pace = pace_after(configuration, _recording(rows))
+    _go(run, plan(run.arm, pace), pacer, rows, rng)
+    return _recording(rows)
+
+
+#: Time, pressures sent and measured, tip position and rotation.
+Sample = tuple[float, Array, Array, Array, Array]
+
+
+def _recording(rows: list[Sample]) -> Recording:
+    return Recording(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def _go(
+    run: _Run, moves: list[Move], pacer: Pacer, rows: list[Sample], rng: np.random.Generator
+) -> None:
+    """Go through moves from the vented arm on; what is seen on the way is added to the rows."""
+    start = np.zeros((run.arm.n_sections, 3))
     tell, whole_s, done_s = progress(), duration_s(moves), 0.0
     for move in moves:
-        begun_ns, first = run.now_ns, len(rows)
-        while not _over(move, 1e-9 * (run.now_ns - begun_ns), rows[first:][-_TAIL:]):
-            tick = run.follow(move.at(start, 1e-9 * (run.now_ns - begun_ns)))
+        first = len(rows)
+        pacer.begin(move)
+        while run.ticks % _LOOK_TICKS or not _over(move, pacer.elapsed_s, rows, first):
+            tick = run.follow(move.at(start, pacer.elapsed_s))
+            sent, measured = tick["pressure_sent_pa"].ravel(), tick["pressure_measured_pa"].ravel()
+            pacer.see(1e-9 * run.now_ns, sent.tolist(), measured.tolist())
+            pacer.go_on(1e-9 * _PERIOD_NS)
             if run.ticks % _SAMPLE_TICKS == 0:
                 rows.append(_sample(run, tick, rng))
         done_s += move.duration_s
         if sys.stderr.isatty():
             tell(done_s, whole_s)
         start = move.pressures_pa
-    return Recording(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-#: Time, pressures sent and measured, tip position and rotation.
-Sample = tuple[float, Array, Array, Array, Array]
 
 
 def _sample(run: _Run, tick: np.void, rng: np.random.Generator) -> Sample:
@@ -127,8 +146,9 @@ def _sample(run: _Run, tick: np.void, rng: np.random.Generator) -> Sample:
     return 1e-9 * run.now_ns, sent, measured, tip, rotation
 
 
-def _over(move: Move, elapsed_s: float, tail: list[Sample]) -> bool:
+def _over(move: Move, elapsed_s: float, rows: list[Sample], first: int) -> bool:
     if elapsed_s < move.duration_s:
         return False
+    tail = rows[max(first, len(rows) - round(move.looked_at_s / _SAMPLE_S) - 1) :]
     time_s, _, measured, tip, _ = (np.array(column) for column in zip(*tail, strict=True))
-    return elapsed_s >= move.longest_s or settled(time_s, measured, tip)
+    return move.over(elapsed_s, time_s, measured, tip)

@@ -26,7 +26,8 @@ _COUPLINGS = slice(6, 13)
 
 _RESPONSE = (
     ("delay_ms", "delay_s", "ms", 1e-3),
-    ("lag_ms", "lag_s", "ms", 1e-3),
+    ("filling_lag_ms", "filling_lag_s", "ms", 1e-3),
+    ("exhausting_lag_ms", "exhausting_lag_s", "ms", 1e-3),
     ("mode_hz", "mode_hz", "Hz", 1.0),
     ("damping_ratio", "damping_ratio", "", 1.0),
 )
@@ -61,17 +62,16 @@ def values(calibration: Calibration) -> list[Value]:
             seen = bool(calibration.fit.share[index, place] < SEEN_SHARE)
             deviation = deviations[field] / one
             found.append(Value(index + 1, key, unit, before, after, deviation, seen))
-    if calibration.response is not None:
-        for key, field, unit, one in _RESPONSE:
-            before, after, deviation = (
-                getattr(response, field) / one
-                for response in (
-                    calibration.before.response,
-                    calibration.response.response,
-                    calibration.response.sd,
-                )
+    for key, field, unit, one in _RESPONSE:
+        before, after, deviation = (
+            getattr(response, field) / one
+            for response in (
+                calibration.before.response,
+                calibration.response.response,
+                calibration.response.sd,
             )
-            found.append(Value(0, key, unit, before, after, deviation))
+        )
+        found.append(Value(0, key, unit, before, after, deviation, seen=deviation > 0.0))
     return found
 
 
@@ -150,6 +150,8 @@ def value_text(value: Value) -> str:
     """One parameter in a line."""
     where = f"section {value.section}: " if value.section else ""
     unit = f" {value.unit}" if value.unit else ""
+    if not (value.section or value.seen):
+        return f"{value.key} = {value.after:.5g}{unit} as it was configured: not identified"
     unseen = "" if value.seen else " (hardly seen in this motion: near what was configured)"
     return (
         f"{where}{value.key} = {value.after:.5g} +- {value.deviation:.2g}{unit}, was "

@@ -23,7 +23,7 @@ from pneuarm.controllers.limits.limits import refuse_contradictions
 from pneuarm.hardware.device import Device
 from pneuarm.hardware.simulator.device import DEVICE as SIMULATOR
 from pneuarm.hardware.simulator.device import SimulatedDevice, SimulatorConfig, simulated_arm
-from pneuarm.hardware.tables.arm import ArmConfig
+from pneuarm.hardware.tables.arm import ArmConfig, with_two_lags
 from pneuarm.hardware.tables.table import Table
 from pneuarm.logs.schema.printable import printable
 from pneuarm.service.configuration.devices import AnyDevice, devices
@@ -203,6 +203,9 @@ def recorded(toml: str, where: str) -> Configuration:
     tables = _tables(toml, where)
     if isinstance(tables.get("monitors"), dict):
         tables["monitors"] = moved(tables["monitors"])
+    for table in (tables, *tables.values()):  # the arm, and one that a device simulates
+        if isinstance(table, dict) and isinstance(table.get("arm"), dict):
+            table["arm"] = with_two_lags(table["arm"])
     return check(tables, where)
 
 

@@ -44,8 +44,8 @@ class Steering:
         period_s: float,
     ) -> None:
         self._controller, self._feedback = Controller(arm, control), feedback
-        valves = ValveLead(arm.response.lag_s)
-        quick = replace(arm, response=replace(arm.response, lag_s=valves.remaining_s))
+        valves = ValveLead(arm.response)
+        quick = replace(arm, response=valves.behind)
         gain_per_s = control.gain_per_s
         self._follower = Follower(reference, lead_of(quick.response), gain_per_s, period_s)
         self._observer = TipObserver(quick, feedback, period_s)

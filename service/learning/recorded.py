@@ -1,7 +1,5 @@
 """Ticks, live or of a simulated loop, as the measured tip of one trial."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from pneuarm.controllers.actuation.valve_lead import ValveLead
@@ -44,5 +42,4 @@ def _begin_ns(ticks: np.ndarray) -> int:
 
 def ahead_s(response: Response) -> float:
     """By how much (s) the reference runs ahead of the tip."""
-    remaining_s = ValveLead(response.lag_s).remaining_s
-    return lead_of(replace(response, lag_s=remaining_s)).ahead_s
+    return lead_of(ValveLead(response).behind).ahead_s

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Mapping
-from math import exp
 
 from pneuarm.controllers.arm.arm import Arm, Array, Response
 from pneuarm.hardware.interface import Measurement
@@ -47,7 +46,7 @@ MONITORS: tuple[type[Monitor], ...] = (
 
 
 class Lag:
-    """What the pressures should be by now: ``dp/dt = (sent(t - delay) - p) / lag``.
+    """What the pressures should be by now: dead time and lags of :class:`Response`.
 
     Exact over steps; from the first measurement on.
     """
@@ -82,9 +81,9 @@ class Lag:
         passed_s, self._now_s = time_s - self._now_s, time_s
         if passed_s <= 0.0:
             return
-        rest = exp(-passed_s / self._response.lag_s) if self._response.lag_s else 0.0
+        filling, exhausting = self._response.left(passed_s)
         self.expected_pa = [
-            acting + rest * (expected - acting)
+            acting + (filling if acting > expected else exhausting) * (expected - acting)
             for acting, expected in zip(self._acting, self.expected_pa, strict=True)
         ]
 

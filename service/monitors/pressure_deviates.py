@@ -29,9 +29,9 @@ class PressureDeviatesKeys(Table):
         Positive,
         Field(
             description=(
-                "how far a pressure may be from the one expected: the pressure sent, through "
-                "`delay_ms` and `lag_ms` of `[arm.response]`; in a move half of "
-                "what the valve has still to go is allowed besides"
+                "how far a pressure may be from the one expected: the pressure sent, through the "
+                "dead time and the lags of `[arm.response]`; in a move half of what the valve has "
+                "still to go is allowed besides"
             )
         ),
     ] = 0.1
@@ -61,12 +61,15 @@ class PressureDeviates(Monitor):
         "a pressure does not follow its command: a stuck valve, a kinked, loose or burst tube",
         "look at the valve and the tube of the chamber that the event names, then reset",
     )
-    looks_at = "measured against the command through the valve's dead time and first-order lag"
+    looks_at = (
+        "measured against the command through the valve's dead time and its first-order lag of "
+        "filling or exhausting"
+    )
     how_to_set = (
-        "record a session with fast moves; set `delay_ms` and `lag_ms` of `[arm.response]`, which "
-        "`pneuarm calibrate` measures, so that the lagged command lies on the measured pressure, "
-        "`deviation_bar` to twice the largest distance that is left. Long tubes: a longer "
-        "`vent_timeout_s`"
+        "let `pneuarm calibrate` measure `delay_ms`, `filling_lag_ms` and `exhausting_lag_ms` of "
+        "`[arm.response]`; or record a session with fast moves, set them so that the lagged "
+        "command lies on the measured pressure, and `deviation_bar` to twice the largest distance "
+        "that is left. Long tubes: a longer `vent_timeout_s`"
     )
     keys = PressureDeviatesKeys
 

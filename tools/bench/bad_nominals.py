@@ -52,7 +52,13 @@ _SECTION_KEYS = (
     "lengthening_mm_per_bar",
     "softening_mm_per_bar2",
 )
-_RESPONSE_KEYS = ("delay_ms", "lag_ms", "mode_hz", "damping_ratio")
+_RESPONSE_KEYS = (
+    "delay_ms",
+    "filling_lag_ms",
+    "exhausting_lag_ms",
+    "mode_hz",
+    "damping_ratio",
+)
 _ORDERS = ((0, 2, 1), (1, 0, 2), (2, 1, 0), (1, 2, 0), (2, 0, 1))
 _TURNS_DEG = ((0, 0, 30), (0, 0, 90), (0, 0, 180), (90, 0, 0), (180, 0, 0), (0, 20, 0))
 
@@ -192,7 +198,7 @@ class Recorder:
         arm = configuration.build_arm()
         moves = b"".join(move.pressures_pa.tobytes() for move in plan(arm))
         limits = tuple(replace(s, lengthening_m_per_pa=1.0) for s in arm.sections)
-        key = (moves, case.order, case.stiff, str(limits))
+        key = (moves, case.order, case.stiff, str(limits), str(arm.response))
         if key not in self._kept:
             make = self._at_rest if self._quick else self._simulated
             self._kept[key] = make(case, configuration)

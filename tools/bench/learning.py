@@ -42,12 +42,16 @@ FREQUENCIES_HZ: dict[Valves, tuple[float, ...]] = {
 #: may be from the one that these let expect, and a correction that is not quicker than they are.
 SAID: dict[Valves, dict[str, Any]] = {
     "itv": {
-        "arm": {"response": {"delay_ms": 50.0, "lag_ms": 400.0}},
+        "arm": {
+            "response": {"delay_ms": 30.0, "filling_lag_ms": 440.0, "exhausting_lag_ms": 1090.0}
+        },
         "monitors": {"pressure_deviates": {"deviation_bar": 0.3}},
         "feedback": {"time_constant_ms": 600.0},
     },
     "onoff": {
-        "arm": {"response": {"delay_ms": 30.0, "lag_ms": 120.0}},
+        "arm": {
+            "response": {"delay_ms": 20.0, "filling_lag_ms": 140.0, "exhausting_lag_ms": 260.0}
+        },
         "monitors": {"pressure_deviates": {"deviation_bar": 0.2}},
         "feedback": {"time_constant_ms": 300.0},
     },

@@ -15,6 +15,10 @@ from tools.rig.arms import paper_arm, table1_arm
 from tools.rig.foreign_arms import sent_by
 
 SAMPLE_S = 0.01
+#: Valves and mode of an arm that differs from its nominal self.
+TRUE_RESPONSE = Response(
+    delay_s=0.02, filling_lag_s=0.09, exhausting_lag_s=0.15, mode_hz=1.7, damping_ratio=0.2
+)
 #: Where nothing swings, so many samples are enough.
 COARSE_S = 0.05
 
@@ -35,7 +39,7 @@ def other_arm(arm: Arm) -> Arm:
         )
         for section in arm.sections
     )
-    return replace(arm, sections=sections, response=Response(0.02, 0.09, 1.7, 0.2))
+    return replace(arm, sections=sections, response=TRUE_RESPONSE)
 
 
 def quiet(arm: Arm, moves: Sequence[Move]) -> Recording:
@@ -79,7 +83,8 @@ def delayed_and_lagged(sent_pa: Array, response: Response, finer: int = 20) -> A
     for index, entering in enumerate(inputs):
         if index % finer == 0:
             out.append(state.copy())
-        state += step_s / response.lag_s * (entering - state)
+        lags_s = np.where(entering > state, response.filling_lag_s, response.exhausting_lag_s)
+        state += step_s / lags_s * (entering - state)
     return np.array(out).reshape(sent_pa.shape)
 
 

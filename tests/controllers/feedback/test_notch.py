@@ -7,7 +7,9 @@ from pneuarm.controllers.arm.arm import Response
 from pneuarm.controllers.feedback.notch import Notch
 from pneuarm.controllers.feedback.prediction import discrete
 
-RESPONSE = Response(0.007, 0.01, 2.2, 0.13)
+RESPONSE = Response(
+    delay_s=0.007, filling_lag_s=0.01, exhausting_lag_s=0.01, mode_hz=2.2, damping_ratio=0.13
+)
 PERIOD_S = 1e-3
 
 

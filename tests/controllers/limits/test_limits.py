@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
-from pneuarm.controllers.arm.arm import Arm, Array, HalfSpace, Sphere
+from pneuarm.controllers.actuation.valve_lead import largest_rates_pa_s
+from pneuarm.controllers.arm.arm import Arm, Array, HalfSpace, Response, Sphere
+from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.kinematics.constant_curvature import shapes_from_lengths
 from pneuarm.controllers.limits.bend import BendLimit
 from pneuarm.controllers.limits.keep_out import KeepOutLimit
@@ -117,3 +119,24 @@ def test_every_limit_has_a_name_and_a_bit_of_its_own() -> None:
     }
     assert names(0) == ()
     assert set(names(2 | 8)) == {"bend", "keep-out"}
+
+
+@pytest.mark.parametrize("lags_s", [(0.4, 1.6), (0.06, 0.06)], ids=["slow", "quick"])
+@given(seed=SEEDS)
+def test_a_step_leaves_what_slew_and_valves_allow_in_its_direction(
+    lags_s: tuple[float, float], seed: int
+) -> None:
+    response = Response(filling_lag_s=lags_s[0], exhausting_lag_s=lags_s[1])
+    arm = replace(ARMS["paper"], response=response)
+    limit, slew = PressureLimit(arm), arm.per_chamber("pressure_slew_max_pa_s")
+    rising, falling = (np.minimum(slew, rate) for rate in largest_rates_pa_s(response))
+    assert (bool((rising < slew).all()), bool((falling < slew).all())) == (lags_s[0] > 0.06,) * 2
+    rng, dt_s = np.random.default_rng(seed), 0.005
+    before = random_lengths(arm, rng, 0.5)
+    after = before + rng.uniform(-1e-3, 1e-3, (1, 3))
+    symbols = [ca.SX.sym("before", 3), ca.SX.sym("after", 3)]
+    left = CompiledFunction("left", symbols, [limit.step_slack(*symbols, ca.SX(dt_s))])
+    change = PressureMap(arm).pressures_pa(after) - PressureMap(arm).pressures_pa(before)
+    allowed = np.where(change > 0.0, rising, falling) * dt_s
+    slack = left(before, after)[0].reshape(1, 3)
+    np.testing.assert_array_equal(slack >= 0.0, np.abs(change) <= allowed)

@@ -19,7 +19,9 @@ from pneuarm.controllers.targets.targets import CircleTarget, PoseTarget, Positi
 LIMITS = ReferenceLimits(0.5, 4.0, 80.0)
 DT_S = 1e-3
 HOME = TipState(np.array([0.0, 0.0, 0.2]), np.eye(3), np.zeros((6, 3)))
-RESPONSE = Response(0.007, 0.01, 2.2, 0.13)
+RESPONSE = Response(
+    delay_s=0.007, filling_lag_s=0.01, exhausting_lag_s=0.01, mode_hz=2.2, damping_ratio=0.13
+)
 CIRCLE = CircleTarget((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.04, 0.25, 1.0)
 
 

@@ -24,7 +24,8 @@ from pneuarm.controllers.arm.errors import (
     LogError,
     ModeRefused,
 )
-from pneuarm.controllers.calibration.plan import Move
+from pneuarm.controllers.calibration.pace import Pace
+from pneuarm.controllers.calibration.plan import KNOWN, Move
 from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import encoding_of
@@ -76,7 +77,7 @@ def pose_of(state: pb.ArmState, noise_m: np.ndarray) -> PoseInFrame:
     return message
 
 
-def few_moves(arm: Arm) -> list[Move]:
+def few_moves(arm: Arm, pace: Pace = KNOWN) -> list[Move]:
     """Return what is just enough for a fit: a dozen rests, each a short way from the one before."""
     shares = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (-1, 0, 0), (-1, -1, 0)]
     shares += [(0, -1, 0), (0, -1, -1), (0, 0, -1), (1, 1, 0), (1, 1, 1), (0, 0, 0)]
@@ -192,7 +193,7 @@ def test_a_stop_in_the_middle_ends_it_without_the_word(daemon: Daemon) -> None:
     with Camera(daemon), daemon.client() as client:
         time.sleep(0.3)
         with pytest.raises(ModeRefused, match="mode hold"):
-            drive.record(client, few_moves(load().build_arm()), 1, stop, no)
+            drive.record(client, few_moves(load().build_arm()), load(), stop, no)
         assert client.state().mode in (pb.IDLE, pb.READY)
     assert len(asked) == 1
 
@@ -215,7 +216,7 @@ def test_a_stall_holds_names_its_cause_and_goes_on_by_the_word(
     so_far = drive.Progressed()
     with Camera(daemon), daemon.client() as client:
         time.sleep(0.3)
-        drive.record(client, moves, 1, stall, word, so_far)
+        drive.record(client, moves, load(), stall, word, so_far)
         configuration = check(tomllib.loads(client.info().config_toml))
     assert any("target_stale" in why for why in asked), asked
     assert so_far.moves_done == len(moves)

@@ -14,7 +14,7 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pneuarm.controllers.arm.arm import HalfSpace, Sphere
+from pneuarm.controllers.arm.arm import HalfSpace, Response, Sphere
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.controllers.controller import Controller
 from pneuarm.service.cli.parser import PRESETS as CLI_PRESETS
@@ -281,14 +281,34 @@ def test_a_calibrated_section_and_response_become_si(tmp_path: Path) -> None:
         "bending_compliance_deg_per_n_m": 180.0,
         "axial_compliance_mm_per_n": 2.0,
     }
-    tables = {"arm": {"sections": [calibrated], "mass_kg": 0.4, "response": {"lag_ms": 80.0}}}
+    tables = {
+        "arm": {"sections": [calibrated], "mass_kg": 0.4, "response": {"filling_lag_ms": 80.0}}
+    }
     arm = loaded(tmp_path, tomli_w.dumps(tables)).build_arm()
     section = arm.sections[0]
     assert section.coupling[0] == (1.1, 0.0, 0.1)
     assert section.hysteresis_pa == pytest.approx(3000.0)
     assert section.bending_compliance_rad_per_n_m == pytest.approx(np.pi)
     assert section.axial_compliance_m_per_n == pytest.approx(2e-3)
-    assert (arm.mass_kg, arm.response.lag_s, arm.response.delay_s) == (0.4, 0.08, 0.005)
+    response = arm.response
+    assert arm.mass_kg == 0.4
+    assert response == Response(delay_s=0.005, filling_lag_s=0.08, exhausting_lag_s=0.06)
+
+
+def test_the_one_lag_of_before_is_refused_with_what_to_write_and_read_in_a_session(
+    tmp_path: Path,
+) -> None:
+    old = "[arm.response]\nlag_ms = 80.0\n"
+    (line,) = refusals(tmp_path, old)
+    facts = ("lag_ms = 80", "filling_lag_ms = 80", "exhausting_lag_ms = 80", "pneuarm calibrate")
+    assert [fact for fact in facts if fact not in line] == []
+    tables = tomllib.loads(load().to_toml())
+    for table in (tables["arm"], tables["simulator"].setdefault("arm", dict(tables["arm"]))):
+        table["response"] = {"lag_ms": 0.0, "mode_hz": 2.0}
+    told = recorded(tomli_w.dumps(tables), "a session")
+    for arm in (told.build_arm(), told.build_simulated_arm()):
+        assert (arm.response.filling_lag_s, arm.response.exhausting_lag_s) == (1e-3, 1e-3)
+        assert arm.response.mode_hz == 2.0
 
 
 def test_a_coupling_without_an_inverse_is_refused(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pneuarm.controllers.actuation.valve_lead import ValveLead
-from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.arm.arm import Array, Response
 from pneuarm.controllers.feedback.observer import FeedbackSettings
 from pneuarm.service.control.setpoints import Setpoints
 from tools.rig.arms import PAPER_SECTION, paper_arm
@@ -14,13 +14,15 @@ from tools.rig.arms import PAPER_SECTION, paper_arm
 ARM = paper_arm()
 LOW, HIGH = PAPER_SECTION.pressure_min_pa, PAPER_SECTION.pressure_max_pa
 DT_S = 0.005
+NO_LEAD = ValveLead(Response(filling_lag_s=0.0, exhausting_lag_s=0.0))
 #: Beyond the limits below and above, and between them.
 BEYOND = np.array([[LOW - 5e4, HIGH + 5e4, 1e4]])
 WITHIN = np.array([[LOW, HIGH, 1e4]])
 
 
 def setpoints(lag_s: float = 0.06) -> Setpoints:
-    return Setpoints(ARM, FeedbackSettings(), ValveLead(lag_s))
+    response = Response(filling_lag_s=lag_s, exhausting_lag_s=lag_s)
+    return Setpoints(ARM, FeedbackSettings(), ValveLead(response))
 
 
 def step(own: Setpoints, wanted_pa: Array, now_s: float = 0.0) -> Array:
@@ -65,6 +67,25 @@ def test_a_lead_leaves_no_limit_and_is_not_held() -> None:
     assert (sent <= HIGH).all()
 
 
+@pytest.mark.parametrize(("rate_pa_s", "lag_s"), [(4e3, 0.4), (-4e3, 1.6)])
+def test_a_lead_makes_slow_and_lopsided_valves_as_quick_as_it_says(
+    rate_pa_s: float, lag_s: float
+) -> None:
+    lead = ValveLead(Response(filling_lag_s=0.4, exhausting_lag_s=1.6))
+    remaining_s = lead.behind.slower_lag_s
+    assert lead.behind.filling_lag_s == remaining_s < 0.25
+    wanted, pressure, went = 0.0, 0.0, 3.0
+    lead.sent_pa(np.zeros((1, 3)), DT_S)
+    for _ in range(round(went / DT_S)):
+        wanted += rate_pa_s * DT_S
+        sent = float(lead.sent_pa(np.full((1, 3), wanted), DT_S)[0, 0])
+        for _ in range(20):
+            slow_s = 0.4 if sent > pressure else 1.6
+            pressure += DT_S / 20 * (sent - pressure) / slow_s
+    assert wanted - pressure == pytest.approx(rate_pa_s * remaining_s, rel=0.1)
+    assert abs(sent - pressure) == pytest.approx(abs(rate_pa_s) * lag_s, rel=0.1)
+
+
 def test_a_lead_is_ahead_of_what_is_wanted_and_what_is_wanted_is_held() -> None:
     own = setpoints()
     step(own, np.zeros((1, 3)))
@@ -74,7 +95,7 @@ def test_a_lead_is_ahead_of_what_is_wanted_and_what_is_wanted_is_held() -> None:
 
 
 def test_without_dither_lag_or_motion_what_is_wanted_is_what_is_sent() -> None:
-    own = Setpoints(ARM, replace(FeedbackSettings(), dither_pa=0.0), ValveLead(0.0))
+    own = Setpoints(ARM, replace(FeedbackSettings(), dither_pa=0.0), NO_LEAD)
     for pressure in (0.0, 1e3, 2e3):
         wanted = np.full((1, 3), pressure)
         np.testing.assert_allclose(step(own, wanted), wanted)

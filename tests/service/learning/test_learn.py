@@ -58,7 +58,9 @@ def test_slow_valves_whose_lag_is_half_known_are_learnt_too(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     known = bench.arm_with("servo", 0)
-    response = known.arm.response.model_copy(update={"lag_ms": 200.0})
+    response = known.arm.response.model_copy(
+        update={"filling_lag_ms": 200.0, "exhausting_lag_ms": 200.0}
+    )
     slow = known.model_copy(update={"arm": known.arm.model_copy(update={"response": response})})
 
     def lagging(configuration: Configuration, _: object) -> Hardware:

@@ -7,6 +7,8 @@ from math import exp, inf, nan
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pneuarm.controllers.actuation.pressure_map import PressureMap
 from pneuarm.controllers.arm.arm import Arm, Response
@@ -184,7 +186,7 @@ def test_chambers_are_counted_from_one_and_pressures_told_in_bar() -> None:
 
 
 def test_the_lag_is_of_first_order_and_exact_for_any_step() -> None:
-    response = Response(delay_s=0.0, lag_s=0.06)
+    response = Response(delay_s=0.0)
     lag, coarse = Lag(response), Lag(response)
     lag.advance([0.0], [500.0], 0.0)
     coarse.advance([0.0], [500.0], 0.0)
@@ -197,7 +199,7 @@ def test_the_lag_is_of_first_order_and_exact_for_any_step() -> None:
 
 @pytest.mark.parametrize("step_s", [1e-3, 4e-3, 0.05])
 def test_a_command_acts_after_the_dead_time_however_long_a_step_is(step_s: float) -> None:
-    lag = Lag(Response(delay_s=0.005, lag_s=0.06))
+    lag = Lag(Response(delay_s=0.005))
     lag.advance([0.0], [0.0], 0.0)
     for index in range(round(0.2 / step_s)):
         expected = lag.advance([1e5], [0.0], step_s)
@@ -206,11 +208,62 @@ def test_a_command_acts_after_the_dead_time_however_long_a_step_is(step_s: float
 
 
 def test_without_a_lag_the_pressure_is_there_when_the_dead_time_is_over() -> None:
-    lag = Lag(Response(delay_s=0.005, lag_s=0.0))
+    lag = Lag(Response(delay_s=0.005, filling_lag_s=0.0, exhausting_lag_s=0.0))
     lag.advance([0.0], [0.0], 0.0)
     assert lag.advance([1e5], [0.0], 0.004) == [0.0]
     assert lag.advance([2e5], [0.0], 0.004) == [1e5]
     assert lag.advance([2e5], [0.0], 0.004) == [2e5]
+
+
+@pytest.mark.parametrize(("sent_pa", "lag_s"), [(1e5, 0.4), (-1e5, 1.6)])
+def test_a_pressure_is_expected_by_the_lag_of_its_direction(sent_pa: float, lag_s: float) -> None:
+    lag = Lag(Response(delay_s=0.0, filling_lag_s=0.4, exhausting_lag_s=1.6))
+    lag.advance([sent_pa, 0.0], [0.0, 0.0], 0.0)
+    for number in range(1, 300):
+        expected, still = lag.advance([sent_pa, 0.0], [0.0, 0.0], 0.01)
+        assert expected == pytest.approx(sent_pa * (1.0 - exp(-0.01 * number / lag_s)))
+        assert still == 0.0
+
+
+@given(
+    filling_s=st.floats(0.05, 2.0),
+    ratio=st.floats(0.2, 5.0),
+    delay_s=st.floats(0.0, 0.3),
+    seed=st.integers(0, 99),
+)
+@settings(max_examples=20)
+def test_valves_that_answer_as_is_expected_of_them_never_deviate(
+    filling_s: float, ratio: float, delay_s: float, seed: int
+) -> None:
+    response = Response(
+        delay_s=delay_s, filling_lag_s=filling_s, exhausting_lag_s=ratio * filling_s
+    )
+    levels = np.random.default_rng(seed).uniform(-8e4, 8e4, 4).repeat(100)
+    times_s = DT_S * np.arange(len(levels))
+    monitor, lag, pressure = deviates(), Lag(response), 0.0
+    for now_s, level in zip(times_s.tolist(), levels.tolist(), strict=True):
+        seen = replace(WELL, now_s=now_s, measured_pa=[pressure], sent_pa=[level])
+        assert not monitor.look(replace(seen, expected_pa=lag.advance([level], [0.0], DT_S)))
+        for fine_s in now_s + DT_S / 10 * np.arange(10):  # Euler's: no formula of the code
+            late = float(levels[int(max(fine_s - delay_s, 0.0) / DT_S)])
+            slow_s = response.filling_lag_s if late > pressure else response.exhausting_lag_s
+            pressure += DT_S / 10 * (late - pressure) / slow_s
+
+
+@pytest.mark.parametrize(("sent_pa", "lag_s"), [(8e4, 0.4), (-8e4, 1.6)])
+def test_a_stuck_valve_is_told_as_soon_as_the_lag_of_its_direction_allows(
+    sent_pa: float, lag_s: float
+) -> None:
+    monitor = deviates()
+    lag = Lag(Response(delay_s=0.0, filling_lag_s=0.4, exhausting_lag_s=1.6))
+    stuck = replace(WELL, measured_pa=[0.0], sent_pa=[sent_pa])
+    for number in range(500):
+        expected = lag.advance([sent_pa], [0.0], DT_S)
+        if monitor.look(replace(stuck, now_s=DT_S * number, expected_pa=expected)):
+            break
+    # 0.1 bar and half of what is still to go of 0.8 bar: when 0.3333 bar are expected.
+    due_s = -lag_s * math.log(1.0 - 0.3333 / 0.8) + LASTING_S
+    assert DT_S * number == pytest.approx(due_s, abs=3 * DT_S)
 
 
 def test_in_a_move_the_lag_may_be_wrong_by_its_uncertainty() -> None:
