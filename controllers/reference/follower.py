@@ -5,6 +5,9 @@ so the reference runs ahead of the tip by the dead time and the lag, and the law
 body must be given to be there: the inverse of the lowest mode,
 
     u = r + (2 zeta / omega) r' + (1 / omega^2) r''
+
+and for a position the same of what bends the arm, see
+:mod:`pneuarm.controllers.reference.mode_inverse`.
 """
 
 import math
@@ -13,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneuarm.controllers.arm.arm import Array, Response
+from pneuarm.controllers.arm.arm import Arm, Array, Response
 from pneuarm.controllers.geometry.moving_point import MovingPoint
 from pneuarm.controllers.geometry.rotations import (
     quaternion_from_rotation,
@@ -23,6 +26,7 @@ from pneuarm.controllers.geometry.rotations import (
     spin_of,
 )
 from pneuarm.controllers.kinematics.compiled import TipState
+from pneuarm.controllers.reference.mode_inverse import ModeInverse
 from pneuarm.controllers.reference.stream import STREAM_S, Stream
 from pneuarm.controllers.reference.trajectory import (
     FASTEST_SHARE,
@@ -32,7 +36,13 @@ from pneuarm.controllers.reference.trajectory import (
     standing,
 )
 from pneuarm.controllers.targets.same import SAME, is_near, same
-from pneuarm.controllers.targets.targets import PoseTarget, PositionTarget, ShapeTarget, Target
+from pneuarm.controllers.targets.targets import (
+    LawName,
+    PoseTarget,
+    PositionTarget,
+    ShapeTarget,
+    Target,
+)
 
 #: One metre of the limits allows this many radians.
 _TURN_PER_M = 10.0
@@ -72,7 +82,7 @@ class Follower:
     """Keeps the reference of position, pose and shape targets; other kinds pass it by."""
 
     def __init__(
-        self, limits: ReferenceLimits, lead: Lead, gain_per_s: float, period_s: float
+        self, arm: Arm, limits: ReferenceLimits, lead: Lead, gain_per_s: float, period_s: float
     ) -> None:
         turn = ReferenceLimits(
             _TURN_PER_M * limits.speed_m_s,
@@ -83,6 +93,7 @@ class Follower:
         self._lead, self._gain_per_s, self._jerk_max = lead, gain_per_s, limits.jerk_m_s3
         self._largest_m_s = limits.speed_m_s * 3.0**-0.5
         self.too_fast_m_s = 0.0
+        self._inverse = ModeInverse(arm, lead.velocity_s, lead.acceleration_s2)
         self._stream = Stream()
         self._on_the_way: deque[MovingPoint] = deque(maxlen=round(lead.ahead_s / period_s) + 1)
         self.forget()
@@ -248,8 +259,11 @@ class Follower:
         self._chart = rotation
         return rotation
 
-    def step(self, dt_s: float) -> Target | None:
-        """Move on by one tick; return the target for the law, None where it has its own."""
+    def step(self, dt_s: float, lengths_m: Array) -> Target | None:
+        """Move on by one tick; return the target for the law, None where it has its own.
+
+        ``lengths_m`` (n_sections, 3) are the commanded ones.
+        """
         reference = self._reference
         if reference is None or self._target is None:
             return None
@@ -258,19 +272,22 @@ class Follower:
         self._stand_in_the_end(reference)
         motion = reference.step(dt_s)
         self._on_the_way.append(motion)
-        by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
-        ahead = np.array(
-            [p + by_velocity * v + by_acceleration * a for p, v, a in zip(*motion, strict=True)]
-        )
         if reference is self._position:
+            position, velocity, acceleration = (np.array(part) for part in motion)
+            ahead = position + self._inverse.way_m(velocity, acceleration, lengths_m)
             rate = np.array(self._rate(motion, dt_s))
             return PositionTarget(ahead, self._target.law, rate, self._nearest_m())
-        # The law follows a pose by its gain alone, 1 / gain behind.
-        _, velocity, acceleration = (np.array(part) for part in motion)
+        return self._led_pose(motion, self._target.law)
+
+    def _led_pose(self, motion: MovingPoint, law: LawName) -> PoseTarget:
+        """Return the pose for the law, which follows it by its gain alone, 1 / gain behind."""
+        by_velocity, by_acceleration = self._lead.velocity_s, self._lead.acceleration_s2
+        position, velocity, acceleration = (np.array(part) for part in motion)
         self._acceleration = motion.acceleration[:3]
+        ahead = position + by_velocity * velocity + by_acceleration * acceleration
         ahead += (velocity + by_velocity * acceleration) / self._gain_per_s
         turned = rotation_from_vector(ahead[3:]) @ self._chart
-        return PoseTarget(ahead[:3], quaternion_from_rotation(turned), self._target.law)
+        return PoseTarget(ahead[:3], quaternion_from_rotation(turned), law)
 
     def _rate(self, motion: MovingPoint, dt_s: float) -> list[float]:
         """Velocity (3,) of what the law is given, with the jerk within its limit."""

@@ -47,7 +47,7 @@ class Steering:
         valves = ValveLead(arm.response)
         quick = replace(arm, response=valves.behind)
         gain_per_s = control.gain_per_s
-        self._follower = Follower(reference, lead_of(quick.response), gain_per_s, period_s)
+        self._follower = Follower(arm, reference, lead_of(quick.response), gain_per_s, period_s)
         self._observer = TipObserver(quick, feedback, period_s)
         self._notch = Notch(arm.response)
         self._estimator = Estimator(arm)
@@ -179,7 +179,9 @@ class Steering:
         self._tip_before_m = self.tip_m
         offset_m = self._notch.step(self._observer.offset_m, dt_s)
         self._controller.set_correction(offset_m, self._observer.rotation)
-        wanted = self._follower.step(dt_s) if dt_s > 0.0 else None
+        wanted = None
+        if dt_s > 0.0:
+            wanted = self._follower.step(dt_s, self._controller.lengths_m)
         if wanted is not None:
             awaited = self._corrected and not self._near_reference
             self._controller.set_target(wanted, not self._follower.arrived, awaited)
