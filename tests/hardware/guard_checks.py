@@ -323,3 +323,10 @@ def random_commands_stay_safe(Guard: Any) -> None:
         wait_s, age_s = float(rng.uniform(0.0, 0.3)), float(rng.uniform(-0.01, 0.1))
         commands.append((values, wait_s, age_s, bool(rng.random() < 0.5)))
     safe_over(Guard, commands)
+
+
+@check
+def where_no_time_has_passed_a_limited_supply_lets_nothing_rise(Guard: Any) -> None:
+    guard = ready(Guard, (1e4, 0.0, 0.0), flow_pa_s=1e5)
+    expect(guard.check(filled([1e4, 0.0, 0.0]), 0.0, 0.0), [1e4, 0.0, 0.0], NOTHING)
+    expect(guard.check(filled([2e4, 0.0, 0.0]), 0.0, 0.0), [1e4, 0.0, 0.0], SLEWED)

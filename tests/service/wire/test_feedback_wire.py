@@ -77,7 +77,7 @@ def test_a_file_of_waypoints_is_sent(tmp_path: Path) -> None:
 
 
 def test_the_longest_trajectory_runs_and_is_logged_whole(tmp_path: Path) -> None:
-    waypoints = [(0.1 + 0.015 * n, (1e-4 * n, 0.0, 0.2)) for n in range(200)]
+    waypoints = [(0.1 + 0.015 * n, (5e-5 * n, 0.0, 0.2)) for n in range(200)]
     target = trajectory_target(waypoints)
     with Daemon(tmp_path) as daemon:
         with daemon.client() as client:

@@ -207,7 +207,7 @@ WRONG_REQUESTS: dict[str, tuple[dict[str, Any], str]] = {
     "long name": ({"client_id": "n" * 65, "action": "HOLD_NOW"}, "client_id has 65 characters"),
     "longest name": (
         {"client_id": "n" * 65400, "action": "HOLD_NOW"},
-        "client_id has 65400 characters",
+        "at most 2048",
     ),
     "unknown action": ({"client_id": "wire", "action": 99}, "action"),
 }
