@@ -1,5 +1,6 @@
 """The client for a user's own program, against a real daemon."""
 
+import contextlib
 import math
 import signal
 import time
@@ -31,11 +32,21 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
         yield daemon
 
 
+def is_ready(client: Client) -> bool:
+    """Vent, or reset: a stop that was asked for again and again may come after a reset."""
+    with contextlib.suppress(ModeRefused):
+        if client.state().mode == pb.ESTOP:
+            client.reset()
+            time.sleep(0.2)
+        else:
+            client.vent()
+    return client.state().mode == pb.READY
+
+
 @pytest.fixture
 def client(daemon: Daemon) -> Iterator[Client]:
     with daemon.client() as client:
-        client.vent()
-        wait_for(lambda: client.state().mode == pb.READY, "an empty arm")
+        wait_for(lambda: is_ready(client), "an empty arm")
         yield client
 
 
@@ -192,7 +203,7 @@ def test_stop_that_nothing_shows_is_not_confirmed(client: Client, daemon: Daemon
     finally:
         daemon.send_signal_to(gateway, signal.SIGCONT)
     wait_for(lambda: client.state().mode == pb.ESTOP, "the belated stop")
-    client.reset()
+    wait_for(lambda: is_ready(client), "an arm that is reset")
 
 
 def test_what_is_no_state_and_no_event_is_passed_over(client: Client, daemon: Daemon) -> None:
