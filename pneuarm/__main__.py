@@ -24,7 +24,9 @@ def _sentence(text: str) -> str:
 
 
 def _on_signal(number: int, frame: FrameType | None) -> None:
-    """End without a word while a command still loads; nothing has begun yet."""
+    """End without a word while a command still loads, for nothing has begun yet; else raise."""
+    if number != signal.SIGINT:  # a second one would cut short what the first has begun to end
+        signal.signal(number, signal.SIG_IGN)
     loading = None
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
@@ -36,15 +38,15 @@ def _on_signal(number: int, frame: FrameType | None) -> None:
     ):
         if _STOPS:
             os.write(2, f"{_sentence('it was interrupted before it began')}\n".encode())
-        os._exit(130)
-    raise KeyboardInterrupt
+        os._exit(128 + number)
+    raise KeyboardInterrupt(number)
 
 
 def _take_signals() -> None:
-    """Ctrl-C is an exception; so is any other order to end a stop, whose failure must be told."""
+    """Every order to end is an exception, as Ctrl-C is: what was begun is ended in its order."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under `nohup`
         signal.signal(signal.SIGINT, _on_signal)
-    for number in (signal.SIGTERM, signal.SIGHUP) if _STOPS else ():
+    for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _on_signal)
 

@@ -2,14 +2,13 @@
 
 import contextlib
 import os
+import signal
 import sys
 from collections.abc import Callable
 
 from pneuarm.controllers.arm.errors import NotConfirmed
 from pneuarm.service.cli.values import UsageError
 from pneuarm.service.processes.last_resort import sentence
-
-INTERRUPTED = 130
 
 
 def ended(command: Callable[[], int], *, stops: bool) -> int:
@@ -48,7 +47,7 @@ def _failed(error: BaseException, stops: bool) -> int:
     if isinstance(error, KeyboardInterrupt):
         if stops:
             say(str(NotConfirmed("it was interrupted before an answer came")))
-        return INTERRUPTED
+        return 128 + (error.args[0] if error.args else signal.SIGINT)
     text = sentence(error)
     say(text if not stops or isinstance(error, NotConfirmed) else str(NotConfirmed(text)))
     return 2 if isinstance(error, UsageError) else 1

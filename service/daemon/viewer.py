@@ -3,7 +3,6 @@
 It may stall and may be stopped: nothing else notices, and what it did not show is counted.
 """
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -26,6 +25,7 @@ from pneuarm.logs.view.view import View
 from pneuarm.service.configuration.configuration import Configuration, rerun_url
 from pneuarm.service.processes import realtime
 from pneuarm.service.processes.last_resort import sentence
+from pneuarm.service.processes.program import start_beside
 from pneuarm.service.processes.shared import (
     Shared,
     end_with_parent,
@@ -34,7 +34,6 @@ from pneuarm.service.processes.shared import (
 )
 
 _PERIOD_S = 1.0 / 30.0
-_PR_SET_PDEATHSIG = 1
 
 #: More than this behind (s) is not caught up but skipped.
 _CATCH_UP_S = 3.0
@@ -45,23 +44,19 @@ _STALLED_S = 5.0
 #: Without a supervisor: a viewer that stalls would block this process without end.
 _ORPHAN_S = 3.0
 
-#: Bound before any fork: the child of a process with threads must not load a library.
-_PRCTL = ctypes.CDLL(None).prctl
-
 
 def start_server(configuration: Configuration) -> "subprocess.Popen[bytes]":
     """Start Rerun's server as its own process; in the library it would listen everywhere."""
     rerun = configuration.rerun
-    return subprocess.Popen(
+    return start_beside(
         [
             *(_rerun_program(), "--serve-grpc"),
             *("--bind", rerun.bind, "--port", str(rerun.port)),
             *("--server-memory-limit", f"{rerun.memory_limit_mib}MiB"),
         ],
+        ending=signal.SIGKILL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        preexec_fn=_die_with_parent,
-        start_new_session=True,  # Ctrl-C is for the supervisor; the server goes after its viewer
     )
 
 
@@ -71,11 +66,6 @@ def _rerun_program() -> str:
     if spec is None or spec.origin is None:
         raise ConfigurationError("rerun.enabled = true, but rerun-sdk is not installed")
     return str(Path(spec.origin).with_name("rerun"))
-
-
-def _die_with_parent() -> None:
-    """Make the kernel end this process with its parent, however that ends."""
-    _PRCTL(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def has_display() -> bool:
@@ -101,7 +91,7 @@ class Viewing:
     """Feeds the view from the rings."""
 
     def __init__(self, shared: Shared, view: View) -> None:
-        self._shared, self.view = shared, view
+        self._shared, self._view = shared, view
         self._dtype = tick_dtype(len(shared.configuration.arm.sections))
         self._ticks = RingReader(shared.rings.ticks)
         self._skipped = 0
@@ -113,10 +103,10 @@ class Viewing:
         self._skipped += self._ticks.skip_to(self._ticks.head() - self._most)
         records = [record for _, record in self._ticks.read(self._most)]
         if records:
-            self.view.ticks(np.frombuffer(b"".join(records), self._dtype))
+            self._view.ticks(np.frombuffer(b"".join(records), self._dtype))
         for topic, payload, _ in self._events.read():
             if topic is EVENT:
-                self.view.event(pb.Event.FromString(payload))
+                self._view.event(pb.Event.FromString(payload))
         self._shared.viewer.publish(self._skipped + self._ticks.missed)
 
 
@@ -144,7 +134,10 @@ def main(shared: Shared, end: Connection) -> None:
 def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes] | None") -> None:
     """Show until told to end. If its own server ends the viewer ends too, to be started anew."""
     configuration = shared.configuration
-    recording, view = _connect(shared)
+    recording = _recording(shared)
+    recording.connect_grpc(rerun_url(configuration))
+    view = View(configuration.build_arm(), recording)
+    view.start()
     if configuration.rerun.open_viewer and has_display():
         open_viewer(rerun_url(configuration))
     viewing, stepped_s = Viewing(shared, view), time.monotonic()
@@ -152,19 +145,15 @@ def _run(shared: Shared, end: Connection, server: "subprocess.Popen[bytes] | Non
         if server is not None and server.poll() is not None:
             raise ViewerLost(f"Rerun's server ended with status {server.returncode}")
         if time.monotonic() - stepped_s > _STALLED_S:
-            recording, viewing.view = _connect(shared)
+            # The server has what was sent; another stream, or the layout again, keeps its threads.
+            recording.connect_grpc(rerun_url(configuration))
         stepped_s = time.monotonic()
         viewing.step()
     recording.flush(timeout_sec=1.0)
     recording.disconnect()
 
 
-def _connect(shared: Shared) -> tuple[rr.RecordingStream, View]:
-    """Open the recording at the server, or go on with it over a new connection."""
+def _recording(shared: Shared) -> rr.RecordingStream:
     configuration = shared.configuration
     name = configuration.rerun.recording or shared.session
-    recording = rr.RecordingStream(f"pneuarm_{configuration.arm.name}", recording_id=name)
-    recording.connect_grpc(rerun_url(configuration))
-    view = View(configuration.build_arm(), recording)
-    view.start()
-    return recording, view
+    return rr.RecordingStream(f"pneuarm_{configuration.arm.name}", recording_id=name)

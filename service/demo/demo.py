@@ -24,6 +24,7 @@ from pneuarm.service.demo.device import emulated
 from pneuarm.service.demo.figures import Drawn, evaluate, table
 from pneuarm.service.demo.parts import DemoPart, parts, tables
 from pneuarm.service.demo.screen import Screen
+from pneuarm.service.processes.program import start_beside
 
 _START_S = 30.0
 _END_S = 70.0  # the daemon's own last resort comes after 60 s
@@ -70,11 +71,8 @@ def _play(
 
 @contextmanager
 def _daemon(config: Path, quiet: bool) -> "Iterator[subprocess.Popen[bytes]]":
-    daemon = subprocess.Popen(
-        [sys.executable, "-m", "pneuarm", "run", str(config)],
-        stdout=sys.stderr if quiet else None,
-        start_new_session=True,  # Ctrl-C ends the show first, then the daemon
-    )
+    command = [sys.executable, "-m", "pneuarm", "run", str(config)]
+    daemon = start_beside(command, stdout=sys.stderr if quiet else None)
     try:
         yield daemon
     finally:
@@ -105,14 +103,9 @@ def _camera(part: DemoPart, arm: str, endpoint: str) -> Iterator[None]:
     if not part.camera:
         yield
         return
-    camera = subprocess.Popen(
-        [
-            *(sys.executable, "-m", "pneuarm", "emulate", "camera"),
-            *("--arm", arm, "--connect", endpoint),
-        ],
-        stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    command = [sys.executable, "-m", "pneuarm", "emulate", "camera"]
+    command += ["--arm", arm, "--connect", endpoint]
+    camera = start_beside(command, stdout=subprocess.DEVNULL)
     try:
         yield
     finally:

@@ -14,6 +14,7 @@ from pneuarm.hardware.simulator.device import SimulatedDevice
 from pneuarm.service.configuration.devices import devices
 from pneuarm.service.devices.registry import fitting
 from pneuarm.service.emulators.command import LAST_LINE
+from pneuarm.service.processes.program import start_beside
 
 
 @contextmanager
@@ -34,7 +35,7 @@ def emulated(adapter: str, arm: str, seed: int, valves: str) -> Iterator[dict[st
     with tempfile.TemporaryDirectory(prefix="pneuarm-demo-") as folder:
         path = Path(folder) / "device.toml"
         path.write_text(configuration.to_toml())
-        emulator = subprocess.Popen(
+        emulator = start_beside(
             [
                 *(sys.executable, "-m", "pneuarm", "emulate", adapter),
                 *("--arm", str(path), "--seed", str(seed), "--valves", valves),
@@ -42,7 +43,6 @@ def emulated(adapter: str, arm: str, seed: int, valves: str) -> Iterator[dict[st
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             text=True,
-            start_new_session=True,  # Ctrl-C ends the show first, then what it runs on
         )
         try:
             own = {"arm": configuration.arm.model_dump(exclude_none=True)}
