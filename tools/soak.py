@@ -4,8 +4,9 @@
 
 At 1 kHz with feedback by a camera, a live view, a program that moves the arm, one that reads every
 state, and one that takes a core of the machine. The exit status is 1 where a tick is missing, an
-event tells of a fault, or a process grows: by more than 1 MB in an hour after the first minute, by
-a handle or by a thread. Rerun's own server is told and not judged: it keeps what the view shows.
+event tells of a fault or of a process that was started again, or a process grows: by more than 1 MB
+in an hour after the first minute, by a handle or by a thread. Rerun's own server is told and not
+judged: it keeps what the view shows.
 """
 
 import argparse
@@ -25,6 +26,7 @@ from typing import NamedTuple
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from tools.faults.program import Program
 from tools.rig.daemon import Daemon, run_command, wait_for
+from tools.rig.processes import own_memory_bytes
 
 #: After this a process has loaded and touched what it needs, s.
 _SETTLED_S = 60.0
@@ -41,12 +43,9 @@ class Use(NamedTuple):
 
     @classmethod
     def of(cls, pid: int) -> "Use":
-        """Read it; the rings, which all processes share, do not count."""
-        status = dict(
-            line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines()
-        )
-        memory_mb = int(status["RssAnon"].split()[0]) / 1024.0
-        return cls(memory_mb, len(os.listdir(f"/proc/{pid}/fd")), int(status["Threads"]))
+        """Read it."""
+        handles, threads = (len(os.listdir(f"/proc/{pid}/{what}")) for what in ("fd", "task"))
+        return cls(own_memory_bytes(pid) / 2**20, handles, threads)
 
 
 def main() -> int:
@@ -60,14 +59,19 @@ def main() -> int:
         daemon = Daemon(Path(folder), tables)
         with daemon, _company(daemon), _told(daemon) as told:
             uses = list(_watch(daemon, minutes))
-        facts = json.loads(run_command("info", str(_log(daemon)), "--json", timeout=900.0).stdout)
+        log = str(daemon.log_path())
+        facts = json.loads(run_command("info", log, "--json", timeout=900.0).stdout)
     _print(uses, facts)
-    grown = [line for name in uses[0][1] for line in _growth(name, uses)]
-    faults = [f"{event.code}: {event.text}" for event in told if event.level == pb.ERROR]
+    grown = [line for name in uses[0][1] if name != _FOREIGN for line in _growth(name, uses)]
+    faults = [f"{event.code}: {event.text}" for event in told if _is_fault(event)]
     lost = [f"{facts['missing_ticks']} ticks are missing"] if facts["missing_ticks"] else []
     for line in (*grown, *faults, *lost):
         print(f"BROKEN  {line}")
     return int(bool(grown or faults or lost))
+
+
+def _is_fault(event: pb.Event) -> bool:
+    return event.level == pb.ERROR or event.code.endswith("_restarted")
 
 
 @contextlib.contextmanager
@@ -126,11 +130,11 @@ def _told(daemon: Daemon) -> Iterator[list[pb.Event]]:
 def _watch(daemon: Daemon, minutes: float) -> Iterator[tuple[float, dict[str, Use]]]:
     """Yield the time and what every process holds, once a minute after the first."""
     begun_s = time.monotonic()
-    names = {pid: name for name, pid in daemon.pids("control", "recorder", "viewer").items()}
     wait_for(lambda: time.monotonic() - begun_s > _SETTLED_S, "the first minute", 2 * _SETTLED_S)
     while (now_s := time.monotonic() - begun_s) <= 60.0 * minutes + 1.0:
         health = daemon.health()
-        uses = {names[pid]: Use.of(pid) for pid in names}
+        pids = daemon.pids("supervisor", "control", "gateway", "recorder", "viewer", "rerun")
+        uses = {name: Use.of(pid) for name, pid in pids.items()}
         print(
             f"{now_s / 60.0:5.1f} min, {health.rate_hz:.1f} Hz, {health.overruns} overruns: "
             + ", ".join(f"{name} {use.memory_mb:.2f} MB" for name, use in uses.items()),
@@ -145,8 +149,6 @@ def _growth(name: str, uses: list[tuple[float, dict[str, Use]]]) -> Iterator[str
     (first_s, first), (last_s, last) = uses[0], uses[-1]
     hours = max(last_s - first_s, 1.0) / 3600.0
     grown_mb = last[name].memory_mb - first[name].memory_mb
-    if name == _FOREIGN:
-        return
     if grown_mb > _MOST_MB_AN_HOUR * max(hours, 1.0):
         yield f"{name} grew by {grown_mb:.2f} MB in {60.0 * hours:.0f} minutes"
     if last[name].handles > first[name].handles:
@@ -163,10 +165,6 @@ def _print(uses: list[tuple[float, dict[str, Use]]], facts: dict[str, object]) -
         pairs = zip(first, last, strict=True)
         print(f"| {name} | " + " | ".join(f"{a:.5g} -> {b:.5g}" for a, b in pairs) + " |")
     print({key: value for key, value in facts.items() if isinstance(value, (int, float, bool))})
-
-
-def _log(daemon: Daemon) -> Path:
-    return max(path for path in daemon.logs.glob("*.mcap") if "." not in path.stem)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ pace the rest may go. Without vacuum the levels are those above zero only. The m
 sections follow one another, with the other sections vented, and then all of them move together.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,10 @@ _STAIRS, _STEP_OF_FAULT = 4, 0.8
 _STANDS_SHARE, _STANDS_APART_S, _STAIR_REST_S = 0.05, 0.8, 1.6
 #: Of the valves' slower lag: how far the means are apart that tell whether an arm has settled.
 _APART_SHARE, _LONGEST_APART_S = 0.5, 1.5
+
+#: Times (samples,), measured pressures (samples, ...) and measured tips (samples, 3) of the newest
+#: so many seconds.
+Newest = Callable[[float], tuple[Array, Array, Array]]
 
 #: The pace of an arm whose valves are those that are expected.
 KNOWN = Pace()
@@ -77,13 +82,11 @@ class Move:
         pressures: Array = start_pa + share * (self.pressures_pa - start_pa)
         return pressures
 
-    def over(self, elapsed_s: float, time_s: Array, measured_pa: Array, tip_m: Array) -> bool:
-        """Whether it is over, by the newest samples; ``elapsed_s`` since it began."""
-        if elapsed_s < self.duration_s:
-            return False
-        if elapsed_s >= self.longest_s:
-            return True
-        return settled(time_s, measured_pa, tip_m, self.apart_s, self.settled_pa)
+    def over(self, elapsed_s: float, newest: Newest) -> bool:
+        """Whether it is over ``elapsed_s`` after it began; ``newest`` is asked once it matters."""
+        if not self.duration_s <= elapsed_s < self.longest_s:
+            return elapsed_s >= self.longest_s
+        return settled(*newest(self.looked_at_s), self.apart_s, self.settled_pa)
 
 
 _ALONE = (0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0)

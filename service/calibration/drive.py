@@ -183,8 +183,8 @@ def _follow(
         now_s = time.monotonic()
         pacer.go_on(now_s - before_s)
         before_s, elapsed_s = now_s, pacer.elapsed_s
-        if elapsed_s >= move.duration_s and now_s >= looked_s:
-            if move.over(elapsed_s, *_newest(states, move.looked_at_s)):
+        if now_s >= looked_s:
+            if move.over(elapsed_s, partial(_newest, states)):
                 return
             looked_s = now_s + _LOOK_S
         if now_s >= sent_s:
@@ -213,11 +213,7 @@ def _newest(states: list[pb.ArmState], seconds: float) -> tuple[Array, Array, Ar
 
 def _require_going_on(client: Client, state: pb.ArmState) -> None:
     if state.mode != pb.ACTIVE:
-        mode = name_of(pb.Mode, state.mode)
-        raise ModeRefused(
-            f"the arm went to mode {mode} in the middle of the calibration"
-            f"{cause(client, state.mode)}"
-        )
+        raise ModeRefused(left_active(client, state, "the calibration"))
     if not is_measured(state):
         raise CalibrationError(
             "the tip was not measured any more in the middle of the calibration: see that the "
@@ -225,7 +221,13 @@ def _require_going_on(client: Client, state: pb.ArmState) -> None:
         )
 
 
-def cause(client: Client, mode: "pb.Mode") -> str:
+def left_active(client: Client, state: pb.ArmState, what: str) -> str:
+    """Say that the arm has left active in the middle of something, and why."""
+    mode = name_of(pb.Mode, state.mode)
+    return f"the arm went to mode {mode} in the middle of {what}{_cause(client, state.mode)}"
+
+
+def _cause(client: Client, mode: "pb.Mode") -> str:
     """Return what the daemon said of the change of mode, in brackets: fault, cause and remedy."""
     time.sleep(0.1)  # an event may come after the state that shows its effect
     told = client.events()

@@ -6,6 +6,7 @@ the true tip with noise.
 
 import sys
 import time
+from functools import partial
 
 import numpy as np
 
@@ -120,9 +121,9 @@ def _go(
     start = np.zeros((run.arm.n_sections, 3))
     tell, whole_s, done_s = progress(), duration_s(moves), 0.0
     for move in moves:
-        first = len(rows)
+        newest = partial(_newest, rows, len(rows))
         pacer.begin(move)
-        while run.ticks % _LOOK_TICKS or not _over(move, pacer.elapsed_s, rows, first):
+        while run.ticks % _LOOK_TICKS or not move.over(pacer.elapsed_s, newest):
             tick = run.follow(move.at(start, pacer.elapsed_s))
             sent, measured = tick["pressure_sent_pa"].ravel(), tick["pressure_measured_pa"].ravel()
             pacer.see(1e-9 * run.now_ns, sent.tolist(), measured.tolist())
@@ -146,9 +147,8 @@ def _sample(run: _Run, tick: np.void, rng: np.random.Generator) -> Sample:
     return 1e-9 * run.now_ns, sent, measured, tip, rotation
 
 
-def _over(move: Move, elapsed_s: float, rows: list[Sample], first: int) -> bool:
-    if elapsed_s < move.duration_s:
-        return False
-    tail = rows[max(first, len(rows) - round(move.looked_at_s / _SAMPLE_S) - 1) :]
+def _newest(rows: list[Sample], first: int, seconds: float) -> tuple[Array, Array, Array]:
+    """Times, measured pressures and tips of the newest rows, none before the ``first``."""
+    tail = rows[max(first, len(rows) - round(seconds / _SAMPLE_S) - 1) :]
     time_s, _, measured, tip, _ = (np.array(column) for column in zip(*tail, strict=True))
-    return move.over(elapsed_s, time_s, measured, tip)
+    return time_s, measured, tip

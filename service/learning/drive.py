@@ -12,8 +12,7 @@ from pneuarm.controllers.limits.limits import words
 from pneuarm.controllers.targets.trajectory import TrajectoryTarget
 from pneuarm.logs.rings.tick import ticks_from_states
 from pneuarm.logs.schema import pneuarm_pb2 as pb
-from pneuarm.logs.schema.printable import name_of
-from pneuarm.service.calibration.drive import cause, is_measured, not_measured
+from pneuarm.service.calibration.drive import is_measured, left_active, not_measured
 from pneuarm.service.client.client import Client
 from pneuarm.service.client.target_messages import position_target, trajectory_target
 from pneuarm.service.configuration.configuration import Configuration
@@ -121,11 +120,8 @@ class Driver:
 
     def _require_going_on(self, state: pb.ArmState) -> None:
         if state.mode != pb.ACTIVE:
-            mode = name_of(pb.Mode, state.mode)
-            raise ModeRefused(
-                f"the arm went to mode {mode} in the middle of a trial"
-                f"{cause(self._client, state.mode)}; look for the cause, and learn again"
-            )
+            why = left_active(self._client, state, "a trial")
+            raise ModeRefused(f"{why}; look for the cause, and learn again")
         if not is_measured(state):
             raise LearningError(not_measured(self._client.arm, "learning"))
 

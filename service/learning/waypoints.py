@@ -4,9 +4,8 @@ import math
 from pathlib import Path
 
 from pneuarm.controllers.arm.errors import InvalidInput
+from pneuarm.hardware.tables.table import MM
 from pneuarm.service.configuration.text_file import read_text
-
-MM = 1e-3
 
 
 def read_waypoints(path: Path) -> list[tuple[float, list[float]]]:

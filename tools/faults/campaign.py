@@ -125,7 +125,7 @@ class FaultRun:
         self._open.close()
 
     def _audit(self, rig: Rig, arm: Arm) -> None:
-        path = rig.log_path()
+        path = rig.daemon.log_path()
         audit_log(path, rig.offset_ns, arm, self._unaudited, rig.emulator is not None)
         if rig.emulator is not None:
             audit_device(rig.emulator.record, arm, self._unaudited, rig.emulator.jitter_s)

@@ -5,7 +5,6 @@ import os
 import signal
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -16,6 +15,7 @@ from tools.faults.fault import Fault
 from tools.faults.injection import Injection
 from tools.faults.rig import Rig
 from tools.rig.daemon import enough
+from tools.rig.processes import process
 
 #: The wait before a restart doubles from one to the next, to this at most (s); a process that has
 #: lived so long is started again at once.
@@ -27,10 +27,8 @@ _VIEWED = {"rerun": {"enabled": True, "memory_limit_mib": 32}}
 def _grown_up(rig: Rig, name: str) -> int:
     """Return the number of a process once it has lived long enough to be started again soon."""
     pid = rig.pid(name)
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    begun_s = int(fields[19]) / os.sysconf("SC_CLK_TCK")
-    lived_s = time.clock_gettime(time.CLOCK_BOOTTIME) - begun_s
-    rig.wait_until(enough(_LIVED_S - lived_s), f"a {name} that has lived for long enough")
+    young_s = _LIVED_S - process(pid).lived_s
+    rig.wait_until(enough(young_s), f"a {name} that has lived for long enough")
     return pid
 
 

@@ -19,6 +19,7 @@ from tools.faults.emulator import EMPTY_PA, Emulator
 from tools.faults.injection import Injection
 from tools.faults.program import Program
 from tools.rig.daemon import Daemon, health_of, wait_for
+from tools.rig.processes import own_memory_bytes
 
 T = TypeVar("T")
 
@@ -269,11 +270,6 @@ class Rig:
         said = self.daemon.output()
         injection.check("no traceback", "Traceback" not in said, said[-2000:])
 
-    def log_path(self) -> Path:
-        """First part of the newest session; raises ValueError where there is none."""
-        logs = self.daemon.logs.glob("*.mcap")
-        return max(path for path in logs if "." not in path.stem)
-
     def last_words(self) -> str:
         """What the daemon has said last, for whoever looks for the cause."""
         newest = self._watcher._newest if self._watcher is not None else None
@@ -283,7 +279,5 @@ class Rig:
         return "".join(f"\n    {line}" for line in lines)
 
     def memory_bytes(self, name: str) -> int:
-        """Own memory of one of the daemon's processes; the rings, which all share, do not count."""
-        status = Path(f"/proc/{self.pid(name)}/status").read_text()
-        (line,) = (line for line in status.splitlines() if line.startswith("RssAnon"))
-        return 1024 * int(line.split()[1])
+        """Own memory of one of the daemon's processes."""
+        return own_memory_bytes(self.pid(name))

@@ -65,7 +65,7 @@ def measure_stop(times: int, valves: Valves) -> StopLatency:
         ball.close()
         rig.end_programs()
         rig.daemon.stop()
-        session = read_session(rig.log_path(), rig.offset_ns)
+        session = read_session(rig.daemon.log_path(), rig.offset_ns)
     for call_ns in calls_ns:
         later = session.time_ns >= call_ns
         at = np.flatnonzero(later & (session.mode == pb.ESTOP))

@@ -24,6 +24,7 @@ from pneuarm.controllers.arm.errors import DaemonUnreachable, PneuarmError
 from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.topics import HEALTH
+from tools.rig.processes import process, processes
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -33,6 +34,9 @@ PATIENCE_S = 120.0
 
 #: A start that gets no further for so long hangs.
 STANDSTILL_S = 60.0
+
+#: The recorder writes every 0.4 s; an event may be what explains why a test failed.
+_FLUSHED_S = 1.0
 
 _numbers = itertools.count(1)
 T = TypeVar("T")
@@ -243,10 +247,9 @@ class Daemon:
         """Say whether a process is of this daemon's group, or a child of one that is."""
         running = self._running()
         try:
-            parent = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+            return pid in running or process(pid).parent in running
         except OSError:
             return False
-        return pid in running or parent in running
 
     def stop(self) -> None:
         """End it as it should end: SIGTERM, status 0, nothing left behind, no traceback."""
@@ -256,26 +259,23 @@ class Daemon:
             assert "Traceback" not in self.output(), self.output()
 
     def kill(self) -> None:
-        """Make sure that nothing of it is left."""
+        """Make sure that nothing of it is left; what it has told until now stands in its log."""
         if self.process is not None and self._running():
+            time.sleep(_FLUSHED_S)
             os.killpg(self.pid, signal.SIGKILL)
             self.wait()
 
     def _running(self) -> list[int]:
         """Return the living processes of the group; a zombie does not count."""
-        found = []
-        for path in Path("/proc").glob("[0-9]*/stat"):
-            try:
-                state, _, group = path.read_text().rpartition(")")[2].split()[:3]
-            except OSError:
-                continue
-            if int(group) == self.pid and state != "Z":
-                found.append(int(path.parent.name))
-        return found
+        return [each.pid for each in processes() if each.group == self.pid and each.state != "Z"]
+
+    def log_path(self) -> Path:
+        """First part of the newest session; raises ValueError where there is none."""
+        return max(path for path in self.logs.glob("*.mcap") if "." not in path.stem)
 
     def log(self) -> LogReader:
         """Open the newest session."""
-        return LogReader(max(path for path in self.logs.glob("*.mcap") if "." not in path.stem))
+        return LogReader(self.log_path())
 
     def events(self) -> list[pb.Event]:
         """Return the events that the newest session holds, in the order of their time."""
@@ -328,6 +328,11 @@ def keep_moving(client: Client, until: Callable[[], T], what: str) -> T:
         return until()
 
     return wait_for(moved, what)
+
+
+def has_air(client: Client, least_pa: float) -> Callable[[], bool]:
+    """Return a condition that is true while a chamber is sent more than some pressure."""
+    return lambda: max(abs(p) for p in client.state().pressure_sent_pa) > least_pa
 
 
 def enough(seconds: float) -> Callable[[], bool]:

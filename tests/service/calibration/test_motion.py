@@ -1,6 +1,7 @@
 """Valves that nobody has measured: their gentle steps, and a pace at which no monitor speaks."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -45,15 +46,16 @@ class Watched:
             self._pacer.begin(move)
             while True:
                 elapsed_s = self._pacer.elapsed_s
-                newest = self.rows[max(first, len(self.rows) - round(move.looked_at_s / STEP_S)) :]
-                if elapsed_s >= move.duration_s and len(self.rows) % 10 == 0:
-                    times, measured = np.array([r[0] for r in newest]), [r[2] for r in newest]
-                    tips = np.full((len(newest), 3), np.nan)
-                    if move.over(elapsed_s, times, np.array(measured), tips):
-                        break
+                if len(self.rows) % 10 == 0 and move.over(elapsed_s, partial(self._newest, first)):
+                    break
                 self._step(move.at(self.at_pa, elapsed_s))
             self.longest_s = max(self.longest_s, self._time_s - begun_s - move.ramp_s)
             self.at_pa = move.pressures_pa
+
+    def _newest(self, first: int, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        newest = self.rows[max(first, len(self.rows) - round(seconds / STEP_S)) :]
+        measured = np.array([row[2] for row in newest])
+        return np.array([row[0] for row in newest]), measured, np.full((len(newest), 3), np.nan)
 
     def _step(self, sent_pa: np.ndarray) -> None:
         self.valve.command(sent_pa, self._time_s)

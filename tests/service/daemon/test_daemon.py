@@ -12,7 +12,7 @@ from pneuarm.logs.reading.reader import LogReader
 from pneuarm.logs.reading.summary import summarise
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.control.loop import NEAR_ZERO_PA
-from tools.rig.daemon import Daemon, enough, keep_moving, wait_for
+from tools.rig.daemon import Daemon, enough, has_air, keep_moving, wait_for
 
 
 @pytest.fixture
@@ -50,11 +50,7 @@ def test_signal_ends_with_vented_arm_and_closed_log(
         pytest.skip("the tests run under nohup, and so does their daemon")
     with daemon.client() as client:
         client.enable()
-
-        def full() -> bool:
-            return max(abs(p) for p in client.state().pressure_sent_pa) > 3 * NEAR_ZERO_PA
-
-        keep_moving(client, full, "pressure in the arm")
+        keep_moving(client, has_air(client, 3 * NEAR_ZERO_PA), "pressure in the arm")
         (daemon.send_signal_to_all if to_all else daemon.send_signal)(number)
         assert daemon.wait() == 0, daemon.output()
     for word in ("Traceback", "killed", "leaked"):

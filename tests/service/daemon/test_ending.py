@@ -13,22 +13,14 @@ import pytest
 from pneuarm.service.daemon import supervisor
 from pneuarm.service.processes.shared import end_with_parent
 from tools.rig.daemon import ROOT, Daemon, wait_for
+from tools.rig.processes import process, processes
 
 pytestmark = pytest.mark.slow
 
 
 def children_of(pid: int) -> list[int]:
     """Processes of the daemon's own that a supervisor has started so far."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            parent = int(path.read_text().rpartition(")")[2].split()[1])
-            command = (path.parent / "cmdline").read_bytes()
-        except OSError:
-            continue
-        if parent == pid and b"spawn_main" in command:
-            found.append(int(path.parent.name))
-    return found
+    return [each.pid for each in processes() if each.parent == pid and "spawn_main" in each.command]
 
 
 def test_the_order_to_end_during_the_start_starts_nothing_more(tmp_path: Path) -> None:
@@ -86,7 +78,7 @@ def test_a_process_that_hangs_ends_after_its_parent(tmp_path: Path) -> None:
 
 def _lives(pid: int) -> bool:
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return process(pid).state != "Z"
     except OSError:
         return False
 

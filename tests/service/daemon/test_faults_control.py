@@ -10,7 +10,7 @@ import pytest
 from pneuarm.logs.reading.summary import summarise
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.control.loop import NEAR_ZERO_PA
-from tools.rig.daemon import Daemon, enough, keep_moving
+from tools.rig.daemon import Daemon, enough, has_air, keep_moving
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def bend(daemon: Daemon) -> None:
     with daemon.client() as client:
         client.enable()
         keep_moving(client, enough(1.0), "a second of movement")
-        assert max(abs(p) for p in client.state().pressure_sent_pa) > 4 * NEAR_ZERO_PA
+        keep_moving(client, has_air(client, 4 * NEAR_ZERO_PA), "air in the arm")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])

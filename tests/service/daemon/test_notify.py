@@ -11,6 +11,7 @@ import pytest
 
 from pneuarm.service.daemon.sd_notify import ServiceManager
 from tools.rig.daemon import Daemon, wait_for
+from tools.rig.processes import process
 
 _INTERVAL_US = 100_000
 
@@ -126,8 +127,7 @@ def test_the_watchdog_is_fed_by_ticks_alone(tmp_path: Path, heard: Manager) -> N
         until(heard, "WATCHDOG=1", 5)
         control = daemon.pids("control")["control"]
         daemon.send_signal_to(control, signal.SIGSTOP)
-        stopped = Path(f"/proc/{control}/stat")
-        wait_for(lambda: stopped.read_text().rpartition(")")[2].split()[0] == "T", "the stop")
+        wait_for(lambda: process(control).state == "T", "the stop")
         heard.read()
         told = until(heard, "STOPPING=1")
         # At most one tick was still to be seen; fed by the supervisor's turns it would be five.

@@ -160,11 +160,9 @@ class Query(Sample):
         self.replies.append(payload)
 
 
-@ANY
-@given(messages(pb.ModeRequest), st.booleans())
-def test_any_request_is_passed_on_or_answered(message: Message, as_json: bool) -> None:
-    taking = Taking()
-    gateway = Gateway.__new__(Gateway)
+def gateway_with_pipe() -> tuple[Gateway, Pipe]:
+    """A gateway without a session, and control's end of its pipe."""
+    taking, gateway = Taking(), Gateway.__new__(Gateway)
     requests, control = new_pipe()
     gateway.__dict__ |= {
         "_arm": SimpleNamespace(name="paper"),
@@ -179,6 +177,13 @@ def test_any_request_is_passed_on_or_answered(message: Message, as_json: bool) -
         "_pending": {},
         "_allowances": {},
     }
+    return gateway, control
+
+
+@ANY
+@given(messages(pb.ModeRequest), st.booleans())
+def test_any_request_is_passed_on_or_answered(message: Message, as_json: bool) -> None:
+    gateway, control = gateway_with_pipe()
     sample = sent_as(message, as_json)
     query = Query(sample.payload, sample.encoding, "pneuarm/paper/cmd/mode")
     gateway._on_mode(query)  # type: ignore[arg-type]
@@ -188,15 +193,7 @@ def test_any_request_is_passed_on_or_answered(message: Message, as_json: bool) -
 
 def test_a_request_that_takes_long_to_read_is_refused_unread() -> None:
     """It would stand before those of everybody else: 256 of them for 9 s."""
-    gateway = Gateway.__new__(Gateway)
-    taking = Taking()
-    gateway.__dict__ |= {
-        "_arm": SimpleNamespace(name="paper"),
-        "_shared": SimpleNamespace(info=SimpleNamespace(versions={"pneuarm": "0"})),
-        "_lease": taking.lease,
-        "_notes": taking.notes,
-        "_publisher": taking.publisher,
-    }
+    gateway, _ = gateway_with_pipe()
     sample = Sample.of(b'{"client_id": "' + b"a" * 60000 + b'"}', JSON)
     query = Query(sample.payload, PROTOBUF, "pneuarm/paper/cmd/mode")
     gateway._on_mode(query)  # type: ignore[arg-type]
