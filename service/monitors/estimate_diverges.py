@@ -38,12 +38,13 @@ class EstimateDiverges(Monitor):
         "compare the state's lengths with the arm, then enable again",
     )
     looks_at = "estimated lengths outside Eq. (4)'s interval"
+    how_to_set = "above the error of an estimate, at the ends of the interval too"
     keys = EstimateDivergesKeys
 
     def __init__(self, arm: Arm, keys: EstimateDivergesKeys) -> None:
         margin_m = keys.margin_mm * MM
-        self._low_m = (arm.per_chamber("length_min_m").reshape(-1) - margin_m).tolist()
-        self._high_m = (arm.per_chamber("length_max_m").reshape(-1) + margin_m).tolist()
+        self._low_m = (arm.per_chamber("length_min_m").ravel() - margin_m).tolist()
+        self._high_m = (arm.per_chamber("length_max_m").ravel() + margin_m).tolist()
         self._lasting_s = keys.lasting_ms * MS
         self._persistence = Persistence()
 

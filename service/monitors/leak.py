@@ -65,10 +65,9 @@ class Leak(Monitor):
         """Name the chamber and what it has lost."""
         if seen.mode != Mode.HOLD:
             self._held_s = 0.0
-            self._persistence.longer(False, seen.now_s, 0.0)
             return ""
         self._filter(seen)
-        index = self._fallen() if self._held_s > SETTLED_S else -1
+        index = self._fallen()
         if not self._persistence.longer(index >= 0, seen.now_s, self._lasting_s):
             return ""
         start, now = self._start_pa[index], self._filtered_pa[index]
@@ -76,7 +75,7 @@ class Leak(Monitor):
 
     def _filter(self, seen: Observation) -> None:
         if self._held_s == 0.0:
-            self._filtered_pa = list(seen.measured_pa)
+            self._filtered_pa = self._start_pa = seen.measured_pa
         self._held_s += seen.dt_s
         rest = exp(-seen.dt_s / FILTER_S)
         self._filtered_pa = [

@@ -32,6 +32,7 @@ class LoopOverruns(Monitor):
         "run `pneuarm doctor`; end other programs, or lower control.rate_hz",
     )
     looks_at = "deadlines missed in a second"
+    how_to_set = "above what the machine misses while the arm does as it should"
     keys = LoopOverrunsKeys
     needs_fresh = False
 

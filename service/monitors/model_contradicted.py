@@ -1,5 +1,6 @@
 """Measured lengths and a measured tip against the model."""
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -30,8 +31,7 @@ class TipModel:
     def __init__(self, arm: Arm) -> None:
         self._pressure_map = PressureMap(arm)
         self._kinematics = CompiledKinematics(arm)
-        self._received_ns = 0
-        self._error_m = np.nan
+        self._received_ns: int | None = None
 
     def error_m(
         self, position_m: Array, received_ns: int, pressures_pa: Array, now_ns: int
@@ -40,8 +40,8 @@ class TipModel:
         if received_ns != self._received_ns:
             self._received_ns = received_ns
             tip = self._kinematics.evaluate(self._pressure_map.lengths_m(pressures_pa))
-            self._error_m = float(np.linalg.norm(position_m - tip.position_m))
-        return self._error_m if (now_ns - received_ns) * 1e-9 <= OLDEST_S else np.nan
+            self._error_m = math.dist(position_m, tip.position_m)
+        return self._error_m if (now_ns - received_ns) * 1e-9 <= OLDEST_S else math.nan
 
 
 class ModelContradictedKeys(Table):
@@ -100,7 +100,7 @@ class ModelContradicted(Monitor):
             what = f"the measured tip is {off_mm:.0f} mm from the model's (allowed: {allowed_mm:g})"
         elif any(length == length for length in seen.lengths_m):
             what = self._length_that_is_off(seen)
-        return what if self._persistence.longer(bool(what), seen.now_s, self._lasting_s) else ""
+        return what if self._persistence.longer(what != "", seen.now_s, self._lasting_s) else ""
 
     def _length_that_is_off(self, seen: Observation) -> str:
         pressures_pa = np.reshape(seen.measured_pa, (-1, 3))

@@ -55,7 +55,7 @@ class Monitor(ABC):
 
     fault: ClassVar[Fault]
     looks_at: ClassVar[str]
-    how_to_set: ClassVar[str] = ""
+    how_to_set: ClassVar[str]
     keys: ClassVar[type[Table]] = Table
     needs_fresh: ClassVar[bool] = True
 

@@ -45,7 +45,7 @@ class Overpressure(Monitor):
     keys = OverpressureKeys
 
     def __init__(self, arm: Arm, keys: OverpressureKeys) -> None:
-        highest = arm.per_chamber("pressure_max_pa").reshape(-1)
+        highest = arm.per_chamber("pressure_max_pa").ravel()
         self._allowed_pa = (highest + keys.margin_bar * BAR).tolist()
         self._lasting_s = keys.lasting_ms * MS
         self._persistence = Persistence()

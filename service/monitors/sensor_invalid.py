@@ -44,6 +44,7 @@ class SensorInvalid(Monitor):
         "look at the sensor of the chamber that the event names, then reset",
     )
     looks_at = "NaN, or far outside the arm's pressures"
+    how_to_set = "above what a working sensor may read beside the arm's pressures"
     keys = SensorInvalidKeys
 
     def __init__(self, arm: Arm, keys: SensorInvalidKeys) -> None:

@@ -6,7 +6,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 _LIMITS = "tests/controllers/limits"
-_MONITORS = "tests/service/monitors/test_monitors.py"
+_MONITORS = (
+    "tests/service/safety/test_faults.py",
+    "tests/service/monitors/test_monitor_bounds.py",
+    "tests/service/monitors/test_monitors.py",
+)
 _CHECKS = ("tests/service/wire/test_checks.py", "tests/service/wire/test_shape_checks.py")
 _SAFETY = "tests/service/safety"
 
@@ -31,7 +35,7 @@ TESTS: dict[str, tuple[str, ...]] = {
         f"{_SAFETY}/test_fault_keeper.py",
         f"{_SAFETY}/test_safety.py",
     ),
-    "service/monitors": (_MONITORS,),
+    "service/monitors": _MONITORS,
     "service/wire/target_checks.py": _CHECKS,
     "controllers/targets/checks.py": _CHECKS,
     "controllers/limits": (_LIMITS, "tests/controllers/laws/test_safe_step_walls.py"),
