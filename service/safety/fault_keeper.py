@@ -26,17 +26,13 @@ class FaultKeeper:
     @property
     def bits(self) -> int:
         """The active faults as bits on the wire."""
-        if not self._failed and not self._seen:
-            return 0
         return sum(1 << fault.bit for fault in self.active)
 
     def seen(self, found: dict[Fault, str], now_s: float) -> None:
         """Take what the monitors see in this tick; what they no longer see is gone."""
         before, self._seen = self._seen, found
         for fault, what in found.items():
-            lasts = fault in before or fault in self._failed
-            if not lasts or fault.policy == Policy.WARN:
-                self._act(fault, what, now_s, again=lasts)
+            self._act(fault, what, now_s, again=fault in before or fault in self._failed)
 
     def failed(self, fault: Fault, what: str, now_s: float) -> None:
         """Take a call or a tick that failed; it is there until :meth:`worked`."""
@@ -46,8 +42,7 @@ class FaultKeeper:
 
     def worked(self) -> None:
         """A whole tick went through: what had failed works again."""
-        if self._failed:
-            self._failed = {}
+        self._failed = {}
 
     def _act(self, fault: Fault, what: str, now_s: float, again: bool) -> None:
         """Change the mode as the policy says; tell it once, with the change or without."""

@@ -78,12 +78,10 @@ class Safety:
             measurement, sent_pa, estimated_m, tip_error_m, before, now_s, dt_s, overruns
         )
         self._faults.seen(found, now_s)
-        if self._keeper.mode != Mode.FAULT:
+        if self._keeper.mode != Mode.FAULT or self._faults.vents():
             self._ramp = None
         elif before != Mode.FAULT and self._faults.ramps():
             self._ramp = Ramp(sent_pa, self._ramp_pa_s, now_s)
-        elif self._ramp is not None and (self._ramp.over(now_s) or self._faults.vents()):
-            self._ramp = None
 
     def failed(self, error: Exception, cause: str, now_s: float) -> None:
         """Latch the fault of a call or a tick that failed; the loop has vented already."""

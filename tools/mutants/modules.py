@@ -33,6 +33,7 @@ TESTS: dict[str, tuple[str, ...]] = {
         f"{_SAFETY}/test_faults.py",
         f"{_SAFETY}/test_ramp.py",
         f"{_SAFETY}/test_fault_keeper.py",
+        f"{_SAFETY}/test_safety_alone.py",
         f"{_SAFETY}/test_safety.py",
     ),
     "service/monitors": _MONITORS,

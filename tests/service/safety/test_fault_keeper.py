@@ -6,7 +6,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.modes.mode import Mode, ModeEvent, next_mode
 from pneuarm.service.modes.mode_keeper import ModeKeeper
 from pneuarm.service.monitors.fault import Fault, Policy
-from pneuarm.service.safety.fault_keeper import REPEAT_S, FaultKeeper
+from pneuarm.service.safety.fault_keeper import FaultKeeper
 from pneuarm.service.safety.faults import FAULTS
 from tests.service.modes.test_mode_keeper import TIMEOUTS
 
@@ -47,7 +47,10 @@ def test_every_fault_in_every_mode_does_what_its_policy_says_and_is_told_once(
     expected = AFTER_POLICY[fault.policy].split()[mode - 1]
     assert kept.modes.mode == Mode[expected]
     (told,) = kept.events
-    assert (told.code, told.cause) == (fault.code, "seen")
+    assert (told.code, told.cause, told.remedy) == (fault.code, "seen", fault.remedy)
+    assert fault.cause in told.text
+    assert fault.policy.consequence in told.text
+    assert told.level == (pb.ERROR if fault.policy >= Policy.RAMP else pb.WARNING)
     assert told.mode == kept.modes.mode
     assert kept.faults.bits == 1 << fault.bit
 
@@ -98,8 +101,39 @@ def test_a_warning_is_told_again_only_after_its_time_however_it_flickers() -> No
     kept = Kept()
     for number in range(2001):
         found = {FAULTS["loop_overruns"]: "late"} if number % 2 == 0 else {}
-        kept.faults.seen(found, number * REPEAT_S / 1000.0)
+        kept.faults.seen(found, number * 0.01)
     assert kept.codes() == ["loop_overruns"] * 3
+
+
+@each_fault
+def test_what_lasts_is_told_once_and_a_warning_every_ten_seconds(fault: Fault) -> None:
+    kept, failing = Kept(), Kept()
+    for number in range(251):
+        kept.faults.seen({fault: "so"}, number * 0.1)
+        failing.faults.failed(fault, "so", number * 0.1)
+    times = 3 if fault.policy == Policy.WARN else 1
+    assert kept.codes() == failing.codes() == [fault.code] * times
+
+
+def test_what_has_failed_and_is_seen_too_is_one_fault() -> None:
+    kept = Kept()
+    kept.faults.failed(DEVICE_LOST, "no answer", 0.0)
+    assert kept.faults.bits == 1 << DEVICE_LOST.bit
+    kept.faults.seen({DEVICE_LOST: "too old"}, 11.0)
+    assert kept.codes() == ["device_lost"]
+    assert kept.faults.bits == 1 << DEVICE_LOST.bit
+    kept.faults.seen({LEAK: "a", SUPPLY_LOW: "b"}, 11.1)
+    assert kept.faults.bits == 1 << DEVICE_LOST.bit | 1 << LEAK.bit | 1 << SUPPLY_LOW.bit
+
+
+def test_a_fault_that_comes_back_within_its_time_is_not_told_again() -> None:
+    kept = Kept()
+    for now_s, found in ((0.0, {SUPPLY_LOW: "a"}), (0.5, {}), (1.0, {SUPPLY_LOW: "b"}), (2.0, {})):
+        kept.faults.seen(found, now_s)
+    assert kept.modes.mode == Mode.HOLD
+    assert kept.codes() == ["supply_low"]
+    kept.faults.seen({SUPPLY_LOW: "c"}, 10.0)
+    assert kept.codes() == ["supply_low"] * 2
 
 
 def test_another_fault_in_a_latched_mode_is_told_too() -> None:

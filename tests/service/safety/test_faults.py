@@ -34,6 +34,8 @@ def test_every_fault_has_a_code_and_a_bit_of_its_own() -> None:
     assert len({fault.code for fault in faults}) == len(faults)
     assert len({fault.bit for fault in faults}) == len(faults)
     assert all(0 <= fault.bit < 32 for fault in faults)  # of a uint32
+    bits = [fault.bit for fault in FAULTS.values()]
+    assert bits == sorted(bits)
 
 
 def test_every_policy_is_used_and_every_fault_says_what_to_do() -> None:
