@@ -28,7 +28,10 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/controllers/laws/test_safe_step_walls.py",
         "tests/controllers/laws/test_safe_step.py",
     ),
-    "service/devices/process.py": ("tests/service/devices/test_process.py",),
+    "service/devices/process.py": (
+        "tests/service/devices/test_process.py",
+        "tests/service/devices/test_process_times.py",
+    ),
     "service/safety": (
         f"{_SAFETY}/test_faults.py",
         f"{_SAFETY}/test_ramp.py",

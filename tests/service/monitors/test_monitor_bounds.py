@@ -297,6 +297,25 @@ def test_a_frozen_reading_tells_how_far_its_command_moved_down() -> None:
     assert all(fact in told for fact in ("section 1, chamber 1", "0.100 bar", " 0.060 bar"))
 
 
+def test_an_estimate_at_the_end_of_what_is_allowed_is_well() -> None:
+    at_ends = replace(WELL, estimated_m=[0.1 - 10.0 * 1e-3, 0.2, 0.3 + 10.0 * 1e-3])
+    assert told_after(made(EstimateDiverges, margin_mm=10.0), at_ends) == inf
+
+
+def test_a_command_for_fewer_chambers_than_were_measured_is_a_mistake() -> None:
+    lag = Lag(Response())
+    lag.advance([0.0, 0.0], [0.0, 0.0, 0.0], DT_S)
+    with pytest.raises(ValueError, match="zip"):
+        lag.advance([0.0, 0.0], [0.0, 0.0, 0.0], DT_S)
+
+
+def test_what_a_monitor_has_looked_at_stays_as_it_was() -> None:
+    frozen, first = made(SensorFrozen), replace(WELL, measured_pa=[1e4] * 3, expected_pa=[2e4] * 3)
+    frozen.look(first)
+    frozen.look(replace(first, measured_pa=[5e4] * 3, expected_pa=[6e4] * 3))
+    assert (first.measured_pa, first.expected_pa) == ([1e4] * 3, [2e4] * 3)
+
+
 # --- the leak -----------------------------------------------------------------------------------
 
 
@@ -336,6 +355,16 @@ def test_a_loss_or_a_pressure_of_just_what_may_be_lost_is_no_leak() -> None:
     ):
         pressures = [(0.0, [held_pa, 0.0, 0.0]), (1.0, [left_pa, 0.0, 0.0])]
         assert (leak_after(made(Leak), pressures, 20.0) < inf) is told
+
+
+def test_the_filter_of_a_slow_loop_comes_to_rest_on_the_bound_itself() -> None:
+    for left_pa, told in ((4.7e4, False), (4.6999e4, True)):
+        leak = made(Leak)
+        for number in range(60):
+            measured = [5e4 if number < 5 else left_pa, 0.0, 0.0]
+            seen = replace(WELL, mode=Mode.HOLD, dt_s=1.0, now_s=float(number))
+            what = leak.look(replace(seen, measured_pa=measured))
+        assert bool(what) is told
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
