@@ -230,6 +230,21 @@ def test_what_was_never_acknowledged_counts_as_zero() -> None:
     assert "setpoint_foreign" not in {fault.code for fault in monitors.look(seen, *arguments)}
 
 
+@pytest.mark.parametrize(
+    ("sent_pa", "measured_pa"), [(2e4, 2e4), (nan, -1e4)], ids=["sent", "never sent"]
+)
+def test_a_pressure_is_compared_with_the_one_that_was_sent(
+    sent_pa: float, measured_pa: float
+) -> None:
+    monitors = Monitors(ARM, MonitorsConfig().keys_of_monitors())
+    for number in range(200):
+        now_s = 10.0 + number * DT_S
+        measured = Measurement(np.full((1, 3), measured_pa), np.full((1, 3), nan), taken_s=now_s)
+        sent = np.full((1, 3), sent_pa)
+        found = monitors.look(measured, sent, ARM.rest_lengths_m, nan, Mode.ACTIVE, now_s, DT_S, 0)
+        assert "pressure_deviates" not in {fault.code for fault in found}
+
+
 def test_setpoints_supply_lengths_and_tip_are_looked_at_in_every_tick() -> None:
     monitors = Monitors(ARM, MonitorsConfig().keys_of_monitors())
     zeros = np.zeros((1, 3))
