@@ -25,6 +25,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "service/wire/lease.py": ("tests/service/wire/test_lease.py",),
     "service/modes": ("tests/service/modes",),
     "controllers/laws/safe_step.py": (
+        "tests/controllers/laws/test_safe_step_rates.py",
         "tests/controllers/laws/test_safe_step_walls.py",
         "tests/controllers/laws/test_safe_step.py",
     ),

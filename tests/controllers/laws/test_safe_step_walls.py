@@ -56,11 +56,21 @@ class Bench:
     def __post_init__(self) -> None:
         limits = (LengthLimit(ARM), self.limit)
         builder = IkBuilder(ARM, limits, False)
-        wanted = Wanted(ARM.n_chambers, PARTS)
-        PositionTarget(np.array([0.0, 0.0, 0.2])).ask(wanted, 5.0, 1.0)
-        self.step = SafeStep(ARM, limits, False, builder.problem.rate.size)
+        self.problem = builder.problem
+        self.wanted = Wanted(ARM.n_chambers, PARTS)
+        self.ask(5.0, 1.0)
+        self.step = SafeStep(ARM, limits, False, self.problem.rate.size)
         dt = np.full(1, DT_S)
-        self.step.bind(self.lengths_m, self.rates_m_s, wanted.values, dt, builder.problem)
+        self.step.bind(self.lengths_m, self.rates_m_s, self.wanted.values, dt, self.problem)
+
+    def ask(
+        self,
+        gain_per_s: float,
+        speed_max_m_s: float,
+        position_m: tuple[float, ...] = (0.0, 0.0, 0.2),
+    ) -> None:
+        """Ask for the tip at a position."""
+        PositionTarget(np.array(position_m)).ask(self.wanted, gain_per_s, speed_max_m_s)
 
     def take(self, wish: Array | None) -> tuple[float, float]:
         """Return length and rate of chamber 1 after the step."""
