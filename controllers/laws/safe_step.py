@@ -20,6 +20,7 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.geometry.compiled_function import CompiledFunction
 from pneuarm.controllers.kinematics.compiled import TipState
 from pneuarm.controllers.laws.solve_ik import IkProblem
+from pneuarm.controllers.limits.limit import column
 from pneuarm.controllers.limits.limits import Limits
 from pneuarm.controllers.targets.targets import PARTS, ROWS
 from pneuarm.controllers.tasks.rows import Parts, symbolic_rows
@@ -43,8 +44,8 @@ class SafeStep:
 
     def __init__(self, arm: Arm, limits: Limits, whole: bool, task_rows: int) -> None:
         self._arm, self._limits = arm, limits
-        self._rate_max = ca.DM(arm.per_chamber("length_rate_max_m_s").reshape(-1))
-        self._acceleration = ca.DM(arm.per_chamber("length_acceleration_max_m_s2").reshape(-1))
+        self._rate_max = column(arm.per_chamber("length_rate_max_m_s"))
+        self._acceleration = column(arm.per_chamber("length_acceleration_max_m_s2"))
         n = arm.n_chambers
         lengths, rates, wish = (ca.SX.sym(name, n) for name in ("lengths", "rates", "wish"))
         vector, want = symbols(n, PARTS)

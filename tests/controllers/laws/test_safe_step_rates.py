@@ -1,10 +1,13 @@
 """The safe step far from every limit: how fast it goes, by numbers that are reckoned otherwise."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.kinematics.compiled import CompiledKinematics
 from pneuarm.controllers.limits.length import LengthLimit
+from pneuarm.controllers.limits.limit import Limit
 from tests.controllers.laws.test_safe_step_walls import (
     ACCELERATION,
     ARM,
@@ -21,6 +24,22 @@ from tests.controllers.laws.test_safe_step_walls import (
 
 #: Of the acceleration, what the way to the target is planned with.
 BRAKING = 0.8 * ACCELERATION
+
+
+class Slow(Limit):
+    """Chamber 1 may go at 10 mm/s, to first order; exactly, at ``exact_m_s``."""
+
+    name, bit, margin_m, convex = "slow", 1 << 22, 0.0, True
+    exact_m_s = 1.0
+
+    def slack(self, lengths: ca.SX) -> ca.SX:
+        return ca.SX(1, 1) + 1.0
+
+    def rate_share(self, lengths: ca.SX, rates: ca.SX) -> ca.SX:
+        return ca.fabs(rates[0]) / 0.01
+
+    def step_slack(self, before: ca.SX, after: ca.SX, dt: ca.SX) -> ca.SX:
+        return dt * self.exact_m_s - ca.fabs(after[0] - before[0])
 
 
 def bench_of(jacobian: Array | None = None, feedback: bool = False) -> Bench:
@@ -145,6 +164,38 @@ def test_a_curved_limit_keeps_half_of_its_margin_or_what_is_left_of_it(room_m: f
     assert left_m >= min(0.5e-3, room_m) - 1e-9
     assert bool(max(rates) > 1e-3) is (room_m > 0.5e-3)
     assert left_m < max(0.6e-3, room_m + 1e-9)
+
+
+@pytest.mark.parametrize(("exact_m_s", "rate_m_s"), [(1.0, 0.01), (0.0061, 0.0059375)])
+def test_what_a_limit_says_of_rates_slows_and_of_a_step_is_kept_exactly(
+    exact_m_s: float, rate_m_s: float
+) -> None:
+    limit = Slow(ARM)
+    limit.exact_m_s = exact_m_s
+    bench = Bench(limit)
+    bench.rates_m_s[:] = 0.0
+    bench.step.take(np.array([0.5, 0.25, -0.5]))
+    expected = rate_m_s * np.array([1.0, 0.5, -1.0])
+    np.testing.assert_allclose(bench.step.rates_m_s, expected, atol=1e-9)
+
+
+def test_the_tip_is_that_of_the_lengths_after_the_step() -> None:
+    bench = bench_of()
+    bench.step.take(np.array([1.0, -0.5, 0.2]))
+    tip = CompiledKinematics(ARM).evaluate(bench.step.moved_m.reshape(1, 3))
+    np.testing.assert_allclose(bench.step.tip.position_m, tip.position_m, atol=1e-14)
+    np.testing.assert_allclose(bench.step.tip.rotation, tip.rotation, atol=1e-14)
+    np.testing.assert_allclose(bench.step.tip.jacobian, tip.jacobian, atol=1e-12)
+
+
+def test_a_wish_of_nothing_brakes_and_is_a_number() -> None:
+    bench = bench_of()
+    bench.ask(5.0, 0.0)  # no speed at all
+    for rates in (CRUISE, np.zeros(3)):
+        bench.rates_m_s[:] = rates
+        bench.step.take(np.zeros(3))
+        assert np.isfinite(bench.step.rates_m_s).all()
+        assert (np.abs(bench.step.rates_m_s) <= np.abs(rates)).all()
 
 
 def test_the_error_is_how_far_the_tip_is_from_its_target_after_the_step() -> None:
