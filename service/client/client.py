@@ -340,17 +340,18 @@ class Client:
             raise NotConfirmed(str(error) or type(error).__name__) from error
 
     def _stop(self, timeout_s: float) -> pb.ArmState:
-        nonce, until = os.urandom(16), time.monotonic() + timeout_s
-        with contextlib.suppress(DaemonUnreachable, MessageRejected):
-            with network.failing_in_words():
-                self._session.put(self._key(ESTOP), nonce, **_URGENT)
-            while (left_s := until - time.monotonic()) > 0.0:
+        nonce, until_s = os.urandom(16), time.monotonic() + timeout_s
+        with contextlib.suppress(DaemonUnreachable), network.failing_in_words():
+            self._session.put(self._key(ESTOP), nonce, **_URGENT)
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            # What fails may go well again in time: a connection that is lost is made anew.
+            with contextlib.suppress(DaemonUnreachable, MessageRejected):
                 for reply in self._ask(
                     ESTOP, nonce, pb.Reply, min(left_s, _STOP_AGAIN_S), **_URGENT
                 ):
                     if reply.accepted and reply.mode == pb.ESTOP and reply.nonce == nonce:
-                        return self._stopped(reply, until)
-                time.sleep(0.01)  # nobody takes the question: no daemon, or one that starts
+                        return self._stopped(reply, until_s)
+            time.sleep(0.01)  # nobody takes the question: no daemon, or one that starts
         raise NotConfirmed(f"the daemon of arm {self.arm!r} did not answer the stop")
 
     def _stopped(self, reply: pb.Reply, until_s: float) -> pb.ArmState:
