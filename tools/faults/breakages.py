@@ -1,6 +1,6 @@
 """Every way in which the tests break the arm, and which fault must be found.
 
-`python -m tests.service.daemon.breakages` prints how fast, over twenty drawn arms and all
+`python -m tools.faults.breakages` prints how fast, over twenty drawn arms and all
 presets, and that the fastest legal moves of a whole arm raise nothing.
 """
 
@@ -23,7 +23,7 @@ from pneuarm.controllers.targets.targets import (
 from pneuarm.hardware.interface import Measurement
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.safety.faults import FAULTS
-from tests.service.safety.faulty import Faulty
+from tools.rig.faulty import Faulty
 from tools.rig.simulated import Bench
 
 #: A device that answers 50 times a second and rounds to a millibar.
