@@ -6,7 +6,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 _LIMITS = "tests/controllers/limits"
-_MONITORS = "tests/service/monitors"
+_MONITORS = "tests/service/monitors/test_monitors.py"
 _CHECKS = ("tests/service/wire/test_checks.py", "tests/service/wire/test_shape_checks.py")
 _SAFETY = "tests/service/safety"
 

@@ -31,6 +31,10 @@ _LIBRARIES = (
     "scipy.spatial.transform",
 )
 
+#: Hypothesis' profile for mutants: that a test fails is all that is asked, not its least example,
+#: which takes a hundred times as long to find.
+_PROFILE = "mutants"
+
 #: A mutant may need this much more processor time than the tests need on the code itself; one that
 #: sleeps without end is ended by the clock, far later, so that a busy machine kills none.
 _CPU_FACTOR, _CPU_MORE_S = 4.0, 10.0
@@ -44,6 +48,9 @@ def load_libraries(scratch: str) -> None:
     for name in _LIBRARIES:
         importlib.import_module(name)
     importlib.import_module("hypothesis.configuration").set_hypothesis_home_dir(scratch)
+    hypothesis = importlib.import_module("hypothesis")
+    phases = [phase for phase in hypothesis.Phase if phase.name not in ("shrink", "explain")]
+    hypothesis.settings.register_profile(_PROFILE, deadline=None, phases=phases)
 
 
 class _Loader(SourceFileLoader):
@@ -122,7 +129,8 @@ def _in_child(name: str, text: str, tests: Sequence[str], limits: Limits) -> Non
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
         sys.meta_path.insert(0, _Finder(name, text))
         pytest = importlib.import_module("pytest")
-        options = ["-x", "-q", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
+        options = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider"]
+        options += ["--hypothesis-seed=0", f"--hypothesis-profile={_PROFILE}"]
         # Hypothesis was loaded before pytest could look at it, which its settings call an error.
         options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
         status = int(pytest.main([*options, "-m", "not slow", *tests]))

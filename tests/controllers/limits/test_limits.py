@@ -1,6 +1,7 @@
 """The limits: what is left of them is what it should be, and clip touches nothing else."""
 
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -22,6 +23,7 @@ from pneuarm.controllers.limits.pressure import PressureLimit
 from tests.controllers.laws.driving import clearance_m
 from tools.rig.arms import ARMS, random_lengths
 
+DT_S = 0.005
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -121,22 +123,30 @@ def test_every_limit_has_a_name_and_a_bit_of_its_own() -> None:
     assert set(names(2 | 8)) == {"bend", "keep-out"}
 
 
+@cache
+def slew_bench(lags_s: tuple[float, float]) -> tuple[Arm, CompiledFunction]:
+    """An arm whose valves have these lags, and what a step of ``DT_S`` leaves of its slew."""
+    arm = replace(
+        ARMS["paper"], response=Response(filling_lag_s=lags_s[0], exhausting_lag_s=lags_s[1])
+    )
+    symbols = [ca.SX.sym("before", 3), ca.SX.sym("after", 3)]
+    left = PressureLimit(arm).step_slack(*symbols, ca.SX(DT_S))
+    return arm, CompiledFunction("left", symbols, [left])
+
+
 @pytest.mark.parametrize("lags_s", [(0.4, 1.6), (0.06, 0.06)], ids=["slow", "quick"])
 @given(seed=SEEDS)
 def test_a_step_leaves_what_slew_and_valves_allow_in_its_direction(
     lags_s: tuple[float, float], seed: int
 ) -> None:
-    response = Response(filling_lag_s=lags_s[0], exhausting_lag_s=lags_s[1])
-    arm = replace(ARMS["paper"], response=response)
-    limit, slew = PressureLimit(arm), arm.per_chamber("pressure_slew_max_pa_s")
-    rising, falling = (np.minimum(slew, rate) for rate in largest_rates_pa_s(response))
+    arm, left = slew_bench(lags_s)
+    slew = arm.per_chamber("pressure_slew_max_pa_s")
+    rising, falling = (np.minimum(slew, rate) for rate in largest_rates_pa_s(arm.response))
     assert (bool((rising < slew).all()), bool((falling < slew).all())) == (lags_s[0] > 0.06,) * 2
-    rng, dt_s = np.random.default_rng(seed), 0.005
+    rng = np.random.default_rng(seed)
     before = random_lengths(arm, rng, 0.5)
     after = before + rng.uniform(-1e-3, 1e-3, (1, 3))
-    symbols = [ca.SX.sym("before", 3), ca.SX.sym("after", 3)]
-    left = CompiledFunction("left", symbols, [limit.step_slack(*symbols, ca.SX(dt_s))])
     change = PressureMap(arm).pressures_pa(after) - PressureMap(arm).pressures_pa(before)
-    allowed = np.where(change > 0.0, rising, falling) * dt_s
+    allowed = np.where(change > 0.0, rising, falling) * DT_S
     slack = left(before, after)[0].reshape(1, 3)
     np.testing.assert_array_equal(slack >= 0.0, np.abs(change) <= allowed)
