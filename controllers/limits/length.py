@@ -43,9 +43,9 @@ class LengthLimit(Limit):
         low, high = self._lower_m, self._upper_m
         if (low < high).all():
             return ""
-        section = int((low >= high).any(axis=1).argmax())
+        section, chamber = np.argwhere(low >= high)[0]
         return (
-            f"section {section + 1}: the pressure range and the interval of lengths leave no "
-            f"length; it would lie between {1e3 * low[section, 0]:.4g} and "
-            f"{1e3 * high[section, 0]:.4g} mm"
+            f"section {section + 1}, chamber {chamber + 1}: the pressure range and the interval of "
+            f"lengths leave no length; it would lie between {1e3 * low[section, chamber]:.4g} and "
+            f"{1e3 * high[section, chamber]:.4g} mm"
         )

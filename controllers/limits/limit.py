@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import ClassVar
 
 import casadi as ca
-import numpy as np
 
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.geometry.compiled_function import CompiledFunction
@@ -91,4 +90,4 @@ class Limit(ABC):
 
 def column(values: Array) -> ca.DM:
     """Constants (n_chambers,) of an array (n_sections, 3)."""
-    return ca.DM(np.asarray(values).reshape(-1))
+    return ca.DM(values.ravel())

@@ -145,8 +145,11 @@ def test_a_step_leaves_what_slew_and_valves_allow_in_its_direction(
     assert (bool((rising < slew).all()), bool((falling < slew).all())) == (lags_s[0] > 0.06,) * 2
     rng = np.random.default_rng(seed)
     before = random_lengths(arm, rng, 0.5)
-    after = before + rng.uniform(-1e-3, 1e-3, (1, 3))
+    after = before + 10.0 ** rng.uniform(-5.0, -2.5) * rng.uniform(-1.0, 1.0, (1, 3))
     change = PressureMap(arm).pressures_pa(after) - PressureMap(arm).pressures_pa(before)
     allowed = np.where(change > 0.0, rising, falling) * DT_S
     slack = left(before, after)[0].reshape(1, 3)
     np.testing.assert_array_equal(slack >= 0.0, np.abs(change) <= allowed)
+    metres = arm.per_chamber("lengthening_m_per_pa")
+    left_pa = np.minimum(rising * DT_S - change, falling * DT_S + change)
+    np.testing.assert_allclose(slack, metres * left_pa, atol=1e-12)
