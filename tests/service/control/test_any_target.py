@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.reach.reach import Reach
-from pneuarm.controllers.targets.checks import FASTEST_M_S
 from pneuarm.controllers.targets.chambers import PostureTarget
+from pneuarm.controllers.targets.checks import FASTEST_M_S
 from pneuarm.controllers.targets.targets import (
     CircleTarget,
     PoseTarget,
