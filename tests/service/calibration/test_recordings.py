@@ -54,7 +54,7 @@ def test_a_log_gives_what_its_ticks_give(tmp_path: Path, monkeypatch: pytest.Mon
     rotations = recording.tip_rotation
     assert rotations is not None
     np.testing.assert_allclose(rotations[:, 0, 2], 2.0 * 0.6 * 0.8)
-    np.testing.assert_allclose(recording.tip_m[20], tip_m(round(20 * 5 + 5)), atol=1e-4)
+    np.testing.assert_allclose(recording.tip_m[20], tip_m(20 * 5 + 5), atol=1e-4)
 
 
 def test_a_log_whose_configuration_is_of_other_sections_is_refused(
