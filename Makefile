@@ -99,6 +99,10 @@ test-lowest:
 	uv pip install --quiet --python $(LOWEST) --resolution lowest-direct \
 	    --requirements pyproject.toml --extra mujoco --extra pictures --group dev --editable .
 	$(LOWEST)/bin/pytest -n 2 --dist loadgroup -m "not slow"
+	uv pip compile --quiet --resolution lowest-direct --python $(LOWEST) distributions/client/pyproject.toml \
+	    --output-file $(LOWEST)/client.txt
+	uv pip install --quiet --python $(LOWEST) --target $(LOWEST)/client --requirements $(LOWEST)/client.txt
+	CLIENT_PACKAGES=$(CURDIR)/$(LOWEST)/client $(LOWEST)/bin/pytest tests/packaging/test_installed.py -k client
 
 clean:
 	rm -rf $(VENV) .venv-* build *.egg-info distributions/client/*.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

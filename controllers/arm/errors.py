@@ -89,6 +89,18 @@ class MoveTimeout(PneuarmError):
     """A target was not reached in time; the arm holds when it is no longer refreshed."""
 
 
+class OutOfReach(PneuarmError):
+    """A target that no lengths within the limits reach; the arm is as near to it as it comes.
+
+    ``nearest_m`` (3,) is where the tip is commanded then, in the base frame, and ``limits`` are
+    the names of the limits that bind.
+    """
+
+    def __init__(self, text: str, nearest_m: tuple[float, ...], limits: tuple[str, ...]) -> None:
+        super().__init__(text)
+        self.nearest_m, self.limits = nearest_m, limits
+
+
 class NotConfirmed(PneuarmError):
     """A stop of which nothing showed that it acted; ``why`` is the reason, without the remedy."""
 

@@ -6,6 +6,7 @@ from collections import deque
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.targets.same import SAME
 
 #: Positions that arrive this close together (s) and move are a stream; without the next one for
 #: as long, the reference goes to the last one and stands.
@@ -14,8 +15,9 @@ STREAM_S = 0.1
 #: Share of the newest step in the speed of a stream: arrival times jitter.
 _NEWEST = 0.4
 
-#: Positions (m) this near are one that comes again: single precision rounds by less.
-_AGAIN_M = 1e-7
+#: Positions (m) this near are one that comes again: single precision rounds by less. So are those
+#: within this share of the step before, up to SAME: programs add noise to what they send again.
+_AGAIN_M, _AGAIN_SHARE = 1e-7, 0.02
 
 #: A position that comes again stands, when it has been there for so many times the last step's
 #: time; before that its source has only not measured the next one yet.
@@ -35,7 +37,7 @@ class Stream:
     def forget(self) -> None:
         """The next position is the first."""
         self._changes: deque[tuple[float, Array]] = deque()
-        self._heard_s = self._step_s = 0.0
+        self._heard_s = self._step_s = self._step_m = 0.0
         self._velocity: Array | None = None
         self._told = np.zeros(3)
         self.waits, self._again_s = False, -math.inf
@@ -46,7 +48,8 @@ class Stream:
         ``waits`` says that the position is the one before, and the next one is still to come.
         """
         pause_s, self._heard_s = at_s - self._heard_s, at_s
-        if self._changes and float(np.abs(position_m - self._changes[-1][1]).max()) <= _AGAIN_M:
+        again_m = max(_AGAIN_M, min(SAME, _AGAIN_SHARE * self._step_m))
+        if self._changes and float(np.abs(position_m - self._changes[-1][1]).max()) <= again_m:
             return self._repeated(at_s)
         self.waits = False
         self._told = self._changed(position_m, at_s, pause_s, largest_m_s)
@@ -70,7 +73,8 @@ class Stream:
             return np.zeros(3)
         self._step_s = pause_s
         newest = (position_m - changes[-1][1]) / pause_s
-        if not float(np.abs(newest).max()) <= largest_m_s:
+        self._step_m = pause_s * float(np.abs(newest).max())
+        if not self._step_m <= pause_s * largest_m_s:
             self._begin(position_m, at_s)
             return np.zeros(3)
         changes.append((at_s, position_m))
@@ -87,4 +91,4 @@ class Stream:
     def _begin(self, position_m: Array, at_s: float) -> None:
         self._changes.clear()
         self._changes.append((at_s, position_m))
-        self._velocity, self._again_s = None, -math.inf
+        self._velocity, self._again_s, self._step_m = None, -math.inf, 0.0

@@ -5,6 +5,7 @@ Programs calculate anew what they send again, or have measured it: the last digi
 
 import math
 from dataclasses import fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def same(one: Target, other: Target | None) -> bool:
     if type(one) is not type(other) or not is_dataclass(one):
         return False
     return all(
-        _equal(getattr(one, field.name), getattr(other, field.name), _tolerance(field.name))
+        _same_field(field.name, getattr(one, field.name), getattr(other, field.name))
         for field in fields(one)
         if field.compare
     )
@@ -39,8 +40,11 @@ def is_near(one: Array, other: Array) -> bool:
     return bool(float(np.abs(one - other).max()) <= SAME)
 
 
-def _tolerance(name: str) -> float:
-    return SAME_PA if name.endswith("_pa") else SAME
+def _same_field(name: str, one: Any, other: Any) -> bool:
+    tolerance = SAME_PA if name.endswith("_pa") else SAME
+    if name.startswith("quaternion") and _equal(one, -other, tolerance):
+        return True  # a rotation has two, and what measures it may take either
+    return _equal(one, other, tolerance)
 
 
 def _equal(one: object, other: object, tolerance: float) -> bool:

@@ -228,7 +228,15 @@ class FestoTerminal(EmulatedDevice[Config]):
 
 
 def watchdog_at_power_on(config: FestoConfig, options: Namespace) -> "TerminalWatchdog":
-    """Return the watchdog of an emulated terminal before a host has set it."""
+    """Return the watchdog of an emulated terminal before a host has set it.
+
+    Raises ConfigurationError for a time that its registers cannot hold.
+    """
     if options.watchdog_ms is None:
         return config.watchdog
+    longest_ms = 2 ** (16 * config.watchdog_words) - 1
+    if not 0 <= options.watchdog_ms <= longest_ms:
+        raise ConfigurationError(
+            f"--watchdog-ms {options.watchdog_ms}: its registers hold 0 (none) to {longest_ms} ms"
+        )
     return replace(config.watchdog, timeout_ms=options.watchdog_ms)

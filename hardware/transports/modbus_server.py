@@ -143,21 +143,22 @@ class ServedTerminal:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._begun = threading.Event()
-        self._failure: OSError | None = None
+        self._failure: Exception | None = None
 
     def inject(self, words: str) -> bool:
         """Break the transport; return whether ``words`` are a fault of it."""
         return self._faults.inject(words, time.monotonic())
 
     def __enter__(self) -> "ServedTerminal":
-        """Listen; raises ConfigurationError where the port is taken."""
+        """Listen; raises ConfigurationError where the port is taken, or is none."""
         self._thread.start()
         self._begun.wait()
         if self._failure is not None:
             self._thread.join()
+            why = getattr(self._failure, "strerror", None) or str(self._failure)
             raise ConfigurationError(
-                f"port {self.port}: cannot listen on {LOOPBACK} ({self._failure.strerror}); choose "
-                "another port, or 0 for a free one"
+                f"port {self.port}: cannot listen on {LOOPBACK} ({why}); choose another port from "
+                "1 to 65535, or 0 for a free one"
             )
         return self
 
@@ -175,7 +176,7 @@ class ServedTerminal:
             self._loop.run_until_complete(self._task)
         except asyncio.CancelledError:
             pass
-        except OSError as error:
+        except Exception as error:  # whatever it is, who entered the context is told
             self._failure = error
         finally:
             self._begun.set()

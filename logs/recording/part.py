@@ -77,6 +77,8 @@ class Part:
         self._file = PatientFile(path)
         self._mcap = ChunkedFile(self._file)
         self._channels: dict[str, int] = {}
+        #: Whether its end is written, on the disk or not yet: nothing can come behind it.
+        self.finished = False
 
     def write(self, topic: Topic, payload: bytes, time_unix_ns: int, sequence: int = 0) -> None:
         """Add one serialised message."""
@@ -121,10 +123,8 @@ class Part:
 
     def finish(self) -> None:
         """Write index and footer and close; raises OSError, and may be tried again."""
-        if not self._finished:
+        if not self.finished:
             self._mcap.finish()
-            self._finished = True
+            self.finished = True
         self._file.drain()
         self._file.close()
-
-    _finished = False

@@ -194,8 +194,12 @@ class Recorder:
         )
 
     def finish(self) -> None:
-        """Write what is left and close the file; raises OSError if the disk refuses."""
-        while self.step():
+        """Write what is left and close the file; raises OSError if the disk refuses.
+
+        It may be tried again: then what was told after the log's end, such as that the disk
+        refuses it, comes too late for it.
+        """
+        while not self._part.finished and self.step():
             pass
         for part in (*self._finishing, self._part):
             part.finish()

@@ -2,7 +2,6 @@
 
 import contextlib
 import tomllib
-import zipfile
 from io import BytesIO
 from pathlib import Path
 
@@ -43,14 +42,18 @@ def load(folder: Path, configuration: Configuration) -> Progressed:
         with np.load(path, allow_pickle=False) as kept:
             recording = Recording(*(kept[name] for name in _FIELDS))
             moves_done, text = int(kept["moves_done"]), str(kept["config_toml"])
+            arm = check(tomllib.loads(text), str(path)).arm
     except FileNotFoundError:
         raise CalibrationError(
             f"there is no broken-off calibration in {folder} ({NAME}): calibrate without --resume, "
             "or name its folder with --out"
         ) from None
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise CalibrationError(f"{path} is damaged: {error}; calibrate without --resume") from error
-    if check(tomllib.loads(text), str(path)).arm != configuration.arm:
+    except Exception as error:  # damaged bytes: there is nothing that the libraries do not raise
+        raise CalibrationError(
+            f"{path} is damaged ({type(error).__name__}: {' '.join(str(error).split())[:200]}); "
+            "calibrate without --resume"
+        ) from error
+    if arm != configuration.arm:
         raise CalibrationError(
             f"{path} was recorded with another [arm] than the daemon's now; start the daemon with "
             "that configuration, or calibrate without --resume"

@@ -18,6 +18,7 @@ _NEEDED = (
     "pressure_sent_pa",
     "pressure_measured_pa",
     "tip_measured_position_m",
+    "tip_measured_orientation_xyzw",
     "tip_measured_age_s",
 )
 

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
@@ -61,9 +62,14 @@ def _read(kind: Callable[[str], Any], text: str) -> Any:
 
 
 class _Numbers:
-    """Tells negative numbers from options; argparse itself takes -1e1 and -inf for options."""
+    """Tells negative numbers from options; argparse itself takes -1e1 and -inf for options.
+
+    What begins as a number was meant for one: -1,5 and -20mm are refused as numbers, by their text.
+    """
 
     def match(self, text: str) -> bool:
+        if re.match(r"-\.?\d", text):
+            return True
         try:
             float(text)
         except ValueError:

@@ -22,15 +22,13 @@ from pneuarm.controllers.arm.errors import (
     LeaseRefused,
     MessageRejected,
     ModeRefused,
-    MoveTimeout,
     NotConfirmed,
     PneuarmError,
-    TargetRejected,
 )
 from pneuarm.controllers.arm.names import check_arm_name
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.codec import decode, encoding_of
-from pneuarm.logs.schema.printable import name_of, printable
+from pneuarm.logs.schema.printable import printable
 from pneuarm.logs.schema.topics import (
     ALIVE_CLIENT,
     ESTOP,
@@ -43,16 +41,10 @@ from pneuarm.logs.schema.topics import (
     Topic,
     full_key,
 )
-from pneuarm.service.client.target_messages import (
-    Vector,
-    pose_target,
-    position_target,
-    twist_target,
-)
+from pneuarm.service.client.moving import Moving
 from pneuarm.service.network import sessions as network
 
 _QUERY_S = 2.0
-_REFRESH_S = 0.02
 
 #: A stop that is not answered for so long is sent again.
 _STOP_AGAIN_S = 0.25
@@ -91,7 +83,7 @@ def _versions_apart(daemons: str) -> str:
     return f" (the daemon is pneuarm {printable(daemons, 32)}, this client {__version__})"
 
 
-class Client:
+class Client(Moving):
     """One connection to the daemon of one arm; a context manager.
 
     Positions are in metres in the base frame, pressures in pascal (gauge), lengths in metres.
@@ -296,11 +288,16 @@ class Client:
     def enable(self, take_over: bool = False, timeout_s: float = 3.0) -> pb.Reply:
         """Take the lease and arm; waits while the chambers are still venting.
 
-        Raises LeaseRefused with the holder's name, or ModeRefused with the reason.
+        Whose lease it is already may ask again. Raises LeaseRefused with the holder's name, or
+        ModeRefused with the reason.
         """
         waited_until = time.monotonic() + timeout_s
         while self.state().mode == pb.IDLE and time.monotonic() < waited_until:
             time.sleep(0.02)
+        if self._secret and self.state().mode == pb.ACTIVE:
+            reply = self.take_lease(take_over)
+            if reply.mode == pb.ACTIVE:
+                return reply
         return self._mode(pb.ENABLE, take_over)
 
     def take_lease(self, take_over: bool = False) -> pb.Reply:
@@ -340,17 +337,18 @@ class Client:
             raise NotConfirmed(str(error) or type(error).__name__) from error
 
     def _stop(self, timeout_s: float) -> pb.ArmState:
-        nonce, until = os.urandom(16), time.monotonic() + timeout_s
-        with contextlib.suppress(DaemonUnreachable, MessageRejected):
-            with network.failing_in_words():
-                self._session.put(self._key(ESTOP), nonce, **_URGENT)
-            while (left_s := until - time.monotonic()) > 0.0:
+        nonce, until_s = os.urandom(16), time.monotonic() + timeout_s
+        with contextlib.suppress(DaemonUnreachable), network.failing_in_words():
+            self._session.put(self._key(ESTOP), nonce, **_URGENT)
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            # What fails may go well again in time: a connection that is lost is made anew.
+            with contextlib.suppress(DaemonUnreachable, MessageRejected):
                 for reply in self._ask(
                     ESTOP, nonce, pb.Reply, min(left_s, _STOP_AGAIN_S), **_URGENT
                 ):
                     if reply.accepted and reply.mode == pb.ESTOP and reply.nonce == nonce:
-                        return self._stopped(reply, until)
-                time.sleep(0.01)  # nobody takes the question: no daemon, or one that starts
+                        return self._stopped(reply, until_s)
+            time.sleep(0.01)  # nobody takes the question: no daemon, or one that starts
         raise NotConfirmed(f"the daemon of arm {self.arm!r} did not answer the stop")
 
     def _stopped(self, reply: pb.Reply, until_s: float) -> pb.ArmState:
@@ -371,6 +369,7 @@ class Client:
         It must be sent again before the daemon's target timeout (200 ms), or the arm holds.
         """
         self._check_process()
+        self._target = target
         self._sequence += 1
         target.client_id = self.client_id
         target.lease_secret = self._secret
@@ -379,75 +378,3 @@ class Client:
         with network.failing_in_words():
             self._targets.put(target.SerializeToString())
         return self._sequence
-
-    def send_position(
-        self,
-        position_m: Vector,
-        law: "pb.Law" = pb.DEFAULT,
-        velocity_m_s: Vector | None = None,
-    ) -> int:
-        """Send a tip position (3,) in the base frame, m; in a stream also its velocity."""
-        return self.send(position_target(position_m, law, velocity_m_s))
-
-    def send_pose(
-        self, position_m: Vector, quaternion_xyzw: Vector, law: "pb.Law" = pb.DEFAULT
-    ) -> int:
-        """Send a tip pose in the base frame: position (3,) m, unit quaternion (4,)."""
-        return self.send(pose_target(position_m, quaternion_xyzw, law))
-
-    def send_twist(
-        self,
-        linear_m_s: Vector,
-        angular_rad_s: Vector | None = None,
-        frame_id: str = "base",
-        reference_point: str = "tip",
-        law: "pb.Law" = pb.DEFAULT,
-    ) -> int:
-        """Send a tip twist: linear (3,) m/s, angular (3,) rad/s or None."""
-        return self.send(twist_target(linear_m_s, angular_rad_s, frame_id, reference_point, law))
-
-    def send_lengths(self, lengths_m: Vector) -> int:
-        """Send chamber lengths, three a section, m."""
-        return self.send(pb.Target(lengths=pb.LengthsTarget(length_m=lengths_m)))
-
-    def send_pressures(self, pressures_pa: Vector) -> int:
-        """Send chamber pressures, three a section, gauge, Pa."""
-        return self.send(pb.Target(pressures=pb.PressuresTarget(pressure_pa=pressures_pa)))
-
-    def move_to(self, position_m: Vector, timeout_s: float = 10.0) -> pb.ArmState:
-        """Send a tip position again and again until it is reached; see wait_until_reached."""
-        return self.wait_until_reached(position_target(position_m), timeout_s)
-
-    def wait_until_reached(self, target: pb.Target, timeout_s: float = 10.0) -> pb.ArmState:
-        """Refresh a target until the arm has reached it, and return the state that says so.
-
-        A target out of reach ends the wait too: the state's ``reach`` tells, ``binding_limits``
-        why. Raises TargetRejected, ModeRefused when the arm stops following, or MoveTimeout.
-        """
-        self.events()
-        first = self.send(target)
-        waited_until = time.monotonic() + timeout_s
-        while time.monotonic() < waited_until:
-            time.sleep(_REFRESH_S)
-            state = self.state()
-            self.raise_if_refused(first)
-            if state.mode != pb.ACTIVE:
-                mode = name_of(pb.Mode, state.mode)
-                raise ModeRefused(f"the arm is in mode {mode} and follows no target; enable it")
-            if state.target_sequence >= first and state.reach in (pb.REACHED, pb.OUT_OF_REACH):
-                return state
-            self.send(target)
-        raise MoveTimeout(
-            f"not reached within {timeout_s:g} s; the arm holds on its way there: give it longer"
-        )
-
-    def raise_if_refused(self, first: int = 0) -> None:
-        """Raise TargetRejected if the daemon has refused a target of this client's.
-
-        Targets before number ``first`` do not count: their refusals may come late.
-        """
-        for event in self.events():
-            # A refused request was raised by its own call; its event may come after that.
-            ours = event.client_id == self.client_id and event.key == TARGET.key
-            if ours and event.code == "rejected" and event.target_sequence >= first:
-                raise TargetRejected(printable(event.text))

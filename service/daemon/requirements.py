@@ -2,32 +2,44 @@
 
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.service.configuration.configuration import Configuration, log_directory
 from pneuarm.service.devices import registry as backends
 from pneuarm.service.network.endpoint import in_url
-from pneuarm.service.network.sessions import check_free, read_config
+from pneuarm.service.network.sessions import check_free, check_here, read_config
 from pneuarm.service.wire.tip_pose_source import read_key
 
 
 def check_machine(configuration: Configuration) -> None:
-    """Raise ConfigurationError for what cannot be read or written here; changes nothing."""
+    """Raise ConfigurationError for what cannot be read, written or listened at here.
+
+    Changes nothing; a port that is taken may be a daemon's that runs, see :func:`check_ports`.
+    """
     backends.check(configuration)
     read_config(configuration.zenoh.config_file)
     read_key(configuration.feedback)
+    for key, _, endpoint in _endpoints(configuration):
+        check_here(key, endpoint)
     directory = log_directory(configuration)
     _try_to_write(directory, next(filter(os.path.lexists, _upward(directory))))
 
 
 def check_ports(configuration: Configuration) -> None:
     """Raise ConfigurationError for a port that somebody listens at."""
+    for _, key, endpoint in _endpoints(configuration):
+        check_free(key, endpoint)
+
+
+def _endpoints(configuration: Configuration) -> Iterator[tuple[str, str, str]]:
+    """Yield where the daemon is to listen, behind the keys of the address and of the port."""
     for endpoint in configuration.zenoh.listen:
-        check_free("zenoh.listen", endpoint)
+        yield "zenoh.listen", "zenoh.listen", endpoint
     rerun = configuration.rerun
     if rerun.enabled and rerun.start_server:
-        check_free("rerun.port", f"tcp/{in_url(rerun.bind)}:{rerun.port}")
+        yield "rerun.bind", "rerun.port", f"tcp/{in_url(rerun.bind)}:{rerun.port}"
 
 
 def make_directory(configuration: Configuration) -> Path:

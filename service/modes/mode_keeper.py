@@ -136,7 +136,8 @@ class ModeKeeper:
     ) -> bool:
         """Apply an event if it means anything now; return whether it did.
 
-        A change is told by ``notice``, without one by what is usual for the event.
+        A change is told by ``notice``, without one by what is usual for the event; so is a hold
+        that is asked for while the arm holds.
         """
         after = next_mode(self.mode, event)
         if after is None:
@@ -145,6 +146,8 @@ class ModeKeeper:
         self.mode = after
         if changed:
             self._entered_s = now_s
+        # Who asks for a hold of an arm that holds already means that nobody else shall go on.
+        if changed or event == ModeEvent.HOLD:
             self.tell(notice or _usual_notice(event, cause), client)
         return True
 

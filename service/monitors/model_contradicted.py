@@ -24,6 +24,9 @@ from pneuarm.service.monitors.monitor import (
 #: An older measurement of the tip says nothing about the present.
 OLDEST_S = 0.2
 
+#: A measured length stands still that has gone less than this share of what the model's has gone.
+_STILL_SHARE = 0.1
+
 
 class TipModel:
     """Pressures to tip by the map and constant curvature; no measurement of the tip is in it."""
@@ -51,6 +54,15 @@ class ModelContradictedKeys(Table):
         Positive,
         Field(description="how far a measured chamber length may be from the model's"),
     ] = 60.0
+    length_still_mm: Annotated[
+        Positive,
+        Field(
+            description=(
+                "how far a chamber length may go by the model while the measured one goes less "
+                "than a tenth of that: its sensor stands still"
+            )
+        ),
+    ] = 10.0
     tip_tolerance_percent: Annotated[
         Positive,
         Field(
@@ -66,27 +78,34 @@ class ModelContradictedKeys(Table):
 class ModelContradicted(Monitor):
     """Lengths against those of the measured pressures; the tip against the estimated one.
 
-    The tolerances must leave room for what the model does not know: load, creep and swinging.
+    The tolerances must leave room for what the model does not know: load, creep and swinging. A
+    length that stands still while its pressures say that it moves is told long before: it may
+    stand near the middle of all moves.
     """
 
     fault = Fault(
         "model_contradicted",
         9,
         Policy.HOLD,
-        "measured lengths or tip pose contradict the model: a slipped sensor or marker, a wrong "
-        "frame, a burst chamber, something in the arm's way",
+        "measured lengths or tip pose contradict the model: a slipped or dead sensor, a slipped "
+        "marker, a wrong frame, a burst chamber, something in the arm's way",
         "look at the arm and at what measures it, then enable again",
     )
     looks_at = "measured lengths and tip against the model of the measured pressures"
     how_to_set = (
         "above what load, creep and swinging do to your arm; in their fastest moves the simulated "
         "arms swing more than half their length off for half a second, which is what the default "
-        "allows for; an arm that moves slowly needs much less"
+        "allows for; an arm that moves slowly needs much less. `length_still_mm` above the "
+        "hysteresis of the chambers, and above what an arm may be pressed that something holds"
     )
     keys = ModelContradictedKeys
 
     def __init__(self, arm: Arm, keys: ModelContradictedKeys) -> None:
         self._length_tolerance_m = keys.length_tolerance_mm * MM
+        self._still_m = keys.length_still_mm * MM
+        #: Of every chamber: where its length was when it last moved, and between which lengths the
+        #: model's has been since.
+        self._stood = [(np.nan, np.nan, np.nan)] * arm.n_chambers
         self._tip_tolerance_m = PERCENT * keys.tip_tolerance_percent * arm.total_rest_length_m
         self._lasting_s = keys.lasting_ms * MS
         self._pressure_map = PressureMap(arm)
@@ -105,6 +124,7 @@ class ModelContradicted(Monitor):
     def _length_that_is_off(self, seen: Observation) -> str:
         pressures_pa = np.reshape(seen.measured_pa, (-1, 3))
         models_m = self._pressure_map.lengths_m(pressures_pa).ravel().tolist()
+        what = self._length_that_stands(seen.lengths_m, models_m)
         for index, (length_m, model_m) in enumerate(zip(seen.lengths_m, models_m, strict=True)):
             if abs(length_m - model_m) > self._length_tolerance_m:
                 length_mm, off_mm = 1e3 * length_m, 1e3 * abs(length_m - model_m)
@@ -112,4 +132,20 @@ class ModelContradicted(Monitor):
                     f"{chamber(index)} measures {length_mm:.0f} mm, {off_mm:.0f} mm from the "
                     f"model's length (allowed: {1e3 * self._length_tolerance_m:g})"
                 )
-        return ""
+        return what
+
+    def _length_that_stands(self, lengths_m: list[float], models_m: list[float]) -> str:
+        what = ""
+        for index, (length_m, model_m) in enumerate(zip(lengths_m, models_m, strict=True)):
+            from_m, low_m, high_m = self._stood[index]
+            stands = abs(length_m - from_m) <= _STILL_SHARE * self._still_m  # false of NaN
+            if not stands or low_m != low_m:
+                from_m, low_m, high_m = length_m, model_m, model_m
+            low_m, high_m = min(low_m, model_m), max(high_m, model_m)
+            self._stood[index] = from_m, low_m, high_m
+            if high_m - low_m > self._still_m:
+                what = (
+                    f"{chamber(index)} stands at {1e3 * length_m:.0f} mm while its pressures moved "
+                    f"it by {1e3 * (high_m - low_m):.0f} mm (allowed: {1e3 * self._still_m:g})"
+                )
+        return what

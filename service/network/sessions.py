@@ -59,18 +59,30 @@ def read_config(config_file: str) -> zenoh.Config:
 def check_free(key: str, text: str) -> None:
     """Raise ConfigurationError if a TCP endpoint is taken already, before anything is started."""
     endpoint = _endpoint(key, text)
-    if not endpoint.is_tcp or endpoint.port is None:
-        return  # Zenoh itself judges other kinds of endpoints
-    family = socket.AF_INET6 if ":" in endpoint.host else socket.AF_INET
+    if endpoint.is_tcp and endpoint.port is not None:  # Zenoh itself judges other kinds
+        _bind(key, endpoint.host, endpoint.port)
+
+
+def check_here(key: str, text: str) -> None:
+    """Raise ConfigurationError if a TCP endpoint cannot be listened at here, on whatever port."""
+    endpoint = _endpoint(key, text)
+    if endpoint.is_tcp:
+        _bind(key, endpoint.host, 0)
+
+
+def _bind(key: str, host: str, port: int) -> None:
+    """Listen nowhere, but see whether it would be possible; port 0 is any that is free."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((endpoint.host, endpoint.port))
+            probe.bind((host, port))
         except (OSError, UnicodeError) as error:
-            where = f"{in_url(endpoint.host)}:{endpoint.port}"
+            where = f"{in_url(host)}:{port}" if port else in_url(host)
+            taken = "is another daemon or viewer running there, or " if port else ""
             raise ConfigurationError(
-                f"{key}: {where} cannot be used ({_why(error)}); is another daemon or viewer "
-                "running there, or is it no address of this machine? choose another"
+                f"{key}: {where} cannot be used ({_why(error)}); {taken}is it no address of this "
+                "machine? choose another"
             ) from error
 
 

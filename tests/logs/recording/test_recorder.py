@@ -217,6 +217,31 @@ def test_finishing_may_be_tried_again(session: Session, monkeypatch: pytest.Monk
     with pytest.raises(OSError, match="No space"):
         recorder.finish()
     recorder.finish()
+    recorder.finish()
+    assert LogReader(session.path).finished
+    assert recorded(session.path)[0] == list(range(1, 201))
+
+
+def test_what_is_told_after_the_end_of_a_log_that_waits_for_the_disk_harms_it_not(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pneuarm.logs.recording.recorder._FLUSH_S", 0.0)
+    recorder = session.recorder()
+    session.write_ticks(100)
+    session.flush(recorder)
+    session.write_ticks(100)
+    real_write = os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pneuarm.logs.recording.part.os.write", full)
+    for _ in range(3):
+        with pytest.raises(OSError, match="No space"):
+            recorder.finish()
+        session.write_events(1)
+    monkeypatch.setattr("pneuarm.logs.recording.part.os.write", real_write)
+    recorder.finish()
     assert LogReader(session.path).finished
     assert recorded(session.path)[0] == list(range(1, 201))
 

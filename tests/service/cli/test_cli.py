@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import socket
 from pathlib import Path
 
 import pytest
@@ -106,6 +107,10 @@ def test_what_was_not_said_has_its_default() -> None:
         (["send", "lengths"], ("VALUE", "required")),
         (["send", "lengths", "200", "two", "200"], ("VALUE", "'two'")),
         (["send", "position", "nan", "0", "200"], ("VALUE", "'nan'", "finite")),
+        (["send", "position", "-1,5", "0", "200"], ("VALUE", "'-1,5'", "number")),
+        (["send", "position", "-20mm", "0", "200"], ("VALUE", "'-20mm'", "number")),
+        (["send", "position", "-.5,0", "0", "200"], ("VALUE", "'-.5,0'", "number")),
+        (["send", "twist", "1", "2", "3", "--seconds", "-1,5"], ("--seconds", "'-1,5'", "number")),
         (["send", "position", "1e999", "0", "200"], ("VALUE", "'1e999'", "finite")),
         (["send", "twist", "1", "2", "3", "--seconds", "soon"], ("--seconds", "'soon'")),
         (["send", "twist", "1", "2", "3", "--seconds", "-1"], ("--seconds", "'-1'", "above 0")),
@@ -188,6 +193,36 @@ def test_config_shows_what_loads_again(tmp_path: Path, capsys: pytest.CaptureFix
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.startswith(f"pneuarm: {path}: control.rate_hz = 1: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "facts"),
+    [
+        ('[log]\ndirectory = "/etc/passwd"', ("log.directory", "/etc/passwd")),
+        ('[rerun]\nbind = "192.0.2.1"', ("rerun.bind", "192.0.2.1", "this machine")),
+        ('[zenoh]\nlisten = ["tcp/192.0.2.1:7447"]', ("zenoh.listen", "192.0.2.1", "machine")),
+        ('[zenoh]\nlisten = ["tcp/nobody.invalid:7447"]', ("zenoh.listen", "nobody.invalid")),
+        ('[zenoh]\nconfig_file = "/none.json5"', ("zenoh.config_file", "/none.json5")),
+        ('[feedback]\ntip_pose_key_file = "/none"', ("feedback.tip_pose_key_file", "/none")),
+    ],
+)
+def test_what_this_machine_has_not_is_told_before_a_start(
+    text: str, facts: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    assert main(["config", "check", str(path)]) == 1
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert all(fact in told for fact in facts)
+
+
+def test_a_port_that_a_daemon_has_is_no_mistake_of_the_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        path.write_text(f'[zenoh]\nlisten = ["tcp/127.0.0.1:{port}"]')
+        assert main(["config", "check", str(path)]) == 0
 
 
 def test_info_tells_what_is_in_a_log(

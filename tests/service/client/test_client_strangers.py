@@ -22,6 +22,8 @@ from tools.rig.daemon import PATIENCE_S, ROOT, Daemon, free_port, wait_for
 #: A field that no message of ours has.
 NEWER = b"\xfa\x3f\x03new"
 
+STOPPED = pb.ArmState(sequence=7, mode=pb.ESTOP, n_sections=1)
+
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
@@ -68,12 +70,11 @@ def publishing(session: zenoh.Session, key: str, payload: bytes) -> Iterator[Non
 def test_a_stop_that_somebody_else_confirms_is_not_confirmed() -> None:
     """A router without a daemon behind it: whatever says that the arm has stopped is a lie."""
     endpoint, arm = f"tcp/127.0.0.1:{free_port()}", "paper"
-    state = pb.ArmState(sequence=7, mode=pb.ESTOP, n_sections=1).SerializeToString()
     answer = pb.Reply(accepted=True, mode=pb.ESTOP, state_sequence=7)
     with (
         open_listening([endpoint], ""),
         open_connected(endpoint) as rogue,
-        publishing(rogue, full_key(arm, STATE.key), state),
+        publishing(rogue, full_key(arm, STATE.key), STOPPED.SerializeToString()),
         answering(rogue, full_key(arm, ESTOP.key), answer) as asked,
         Client(arm, endpoint) as client,
     ):
@@ -81,6 +82,57 @@ def test_a_stop_that_somebody_else_confirms_is_not_confirmed() -> None:
         with pytest.raises(NotConfirmed, match=r"NOT CONFIRMED.*cut the air supply"):
             client.estop(0.6)
         assert asked  # it was asked, and its answer was passed over
+
+
+def test_a_stop_is_asked_again_while_answers_are_errors_or_cannot_be_read() -> None:
+    endpoint, arm = f"tcp/127.0.0.1:{free_port()}", "paper"
+    answers = iter([None, b"\xff", None])
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            payload = next(answers, b"stopped")
+            if payload is None:
+                query.reply_err("not now")
+            elif payload == b"stopped":
+                nonce = b"" if query.payload is None else query.payload.to_bytes()
+                reply = pb.Reply(accepted=True, mode=pb.ESTOP, state_sequence=7, nonce=nonce)
+                query.reply(query.key_expr, reply.SerializeToString())
+            else:
+                query.reply(query.key_expr, payload)
+
+    with (
+        open_listening([endpoint], "") as router,
+        publishing(router, full_key(arm, STATE.key), STOPPED.SerializeToString()),
+        Client(arm, endpoint) as client,
+    ):
+        declared = router.declare_queryable(full_key(arm, ESTOP.key), answer, complete=True)
+        assert client.estop(PATIENCE_S).mode == pb.ESTOP
+        declared.undeclare()
+
+
+def test_a_stop_gets_through_to_a_daemon_that_comes_back() -> None:
+    """The connection is made anew while the stop waits."""
+    endpoint, arm = f"tcp/127.0.0.1:{free_port()}", "paper"
+    stopped: list[pb.ArmState] = []
+    key, state = full_key(arm, STATE.key), STOPPED.SerializeToString()
+    with contextlib.ExitStack() as first:
+        first.enter_context(
+            publishing(first.enter_context(open_listening([endpoint], "")), key, state)
+        )
+        client = Client(arm, endpoint)
+        first.close()
+        with client:
+            stop = threading.Thread(target=lambda: stopped.append(client.estop(PATIENCE_S)))
+            stop.start()
+            time.sleep(1.0)
+            answer = pb.Reply(accepted=True, mode=pb.ESTOP, state_sequence=7)
+            with (
+                open_listening([endpoint], "") as router,
+                answering(router, full_key(arm, ESTOP.key), answer),
+                publishing(router, key, state),
+            ):
+                stop.join()
+    assert [state.mode for state in stopped] == [pb.ESTOP]
 
 
 def test_false_states_and_answers_stop_nothing_and_confirm_nothing(daemon: Daemon) -> None:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from pneuarm.controllers.arm.arm import Array
 from pneuarm.controllers.reach.reach import Reach
+from pneuarm.controllers.targets.chambers import PostureTarget
 from pneuarm.controllers.targets.checks import FASTEST_M_S
 from pneuarm.controllers.targets.targets import (
     CircleTarget,
@@ -15,6 +16,7 @@ from pneuarm.controllers.targets.targets import (
     ShapeTarget,
     Target,
 )
+from pneuarm.controllers.targets.together import TasksTarget
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import RequestMode, SetTarget
 from tools.rig.simulated import Bench, configuration_of
@@ -133,6 +135,16 @@ def test_the_same_with_noise_is_the_same(kind: str, noise: float) -> None:
         assert isinstance(follower._target, ShapeTarget)
 
 
+def test_a_quaternion_of_either_sign_is_the_same_rotation() -> None:
+    """Also among several tasks, which no reference stands before."""
+    bench, turned = bench_of(), np.array([0.1, 0.0, 0.0, 0.99**0.5])
+    for number in range(300):
+        pose = PoseTarget(HOME + np.array([0.0, -0.02, 0.0]), (-1.0) ** number * turned)
+        bench.tick(bench.target(TasksTarget((pose, PostureTarget()))))
+        bench.tick()
+    assert bench.newest["reach"] == Reach.REACHED
+
+
 def test_what_creeps_is_followed_all_the_same() -> None:
     bench = bench_of()
     for number in range(2000):
@@ -147,7 +159,10 @@ def circle(time_s: float) -> Array:
     return HOME + np.array([0.03 * np.cos(angle), 0.03 * np.sin(angle), 0.0])
 
 
-def test_positions_at_30_hz_sent_again_at_100_hz_are_a_stream() -> None:
+@pytest.mark.parametrize("noise_m", [0.0, 1e-6])
+def test_positions_at_30_hz_sent_again_at_100_hz_are_a_stream(noise_m: float) -> None:
+    rng = np.random.default_rng(0)
+
     def largest_error_m(source_hz: float) -> float:
         bench, errors = bench_of(), []
         bench.run(2.0, PositionTarget(circle(0.0)))
@@ -155,7 +170,8 @@ def test_positions_at_30_hz_sent_again_at_100_hz_are_a_stream() -> None:
         for number in range(600):
             at_s = 0.01 * number
             seen_s = np.floor(at_s * source_hz + 1e-6) / source_hz
-            bench.tick(bench.target(PositionTarget(circle(seen_s))))
+            place = circle(seen_s) + rng.uniform(-noise_m, noise_m, 3)
+            bench.tick(bench.target(PositionTarget(place)))
             bench.tick()
             if number > 200:
                 wanted = circle(bench.now_s - begin_s)

@@ -6,7 +6,7 @@ from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.service.modes.mode import Mode
 from pneuarm.service.monitors.fault import Policy
 from pneuarm.service.safety.faults import FAULTS
-from tests.service.daemon.breakages import (
+from tools.faults.breakages import (
     BREAKAGES,
     DEVICES,
     PRESETS,

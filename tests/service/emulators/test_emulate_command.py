@@ -5,8 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneuarm.controllers.arm.errors import ConfigurationError
+from pneuarm.hardware.device import EmulatedDevice
 from pneuarm.hardware.simulator.parameters import NOMINAL, Valves
 from pneuarm.service.cli.parser import build_parser
+from pneuarm.service.configuration.devices import devices
 from pneuarm.service.emulators.command import _emulated_arm, configuration_of
 
 STEP_PA = np.array([[4e4, 4e4, 4e4]])
@@ -39,3 +42,27 @@ def test_each_kind_fills_at_a_pace_of_its_own() -> None:
     servo, itv, onoff = (reached_pa("--valves", valves) for valves in ("servo", "itv", "onoff"))
     assert servo > onoff + 2e3 > itv + 4e3
     assert reached_pa() == servo
+
+
+@pytest.mark.parametrize("name", ["festo-cpx", "festo-vtem"])
+@pytest.mark.parametrize(
+    ("option", "value", "allowed"),
+    [
+        ("--port", "99999", "65535"),
+        ("--port", "-1", "65535"),
+        ("--watchdog-ms", "-1", "0"),
+        ("--watchdog-ms", str(2**40), "65535"),
+    ],
+)
+def test_what_a_terminal_cannot_be_is_refused(
+    name: str, option: str, value: str, allowed: str
+) -> None:
+    arguments = build_parser().parse_args(["emulate", name, f"{option}={value}"])
+    configuration, device = configuration_of(arguments.arm), devices().named(name)
+    assert isinstance(device, EmulatedDevice)
+    config, arm = configuration.of_device(device), configuration.build_arm()
+    emulated = _emulated_arm(arguments, configuration)
+    with pytest.raises(ConfigurationError) as refused:  # noqa: SIM117
+        with device.emulate(config, arm, emulated, arguments):
+            pass
+    assert all(fact in str(refused.value) for fact in (value, allowed))

@@ -375,6 +375,37 @@ def test_lengths_are_compared_with_the_map_of_their_pressures() -> None:
     assert told_after(contradicted(), some) < inf
 
 
+@pytest.mark.parametrize("noise_m", [0.0, 1e-4])
+def test_a_length_that_stands_still_while_its_pressures_move_is_told(noise_m: float) -> None:
+    """Also where it is never far from the model's: it stands in the middle of small moves."""
+    pressure_map, rng = PressureMap(ARM), np.random.default_rng(0)
+    still = contradicted()
+    told: dict[float, str] = {}
+    for share in (0.0, 1.0):  # of the motion, that the third sensor shows: first none
+        for number in range(400):
+            pressures = 2e4 + 6e3 * np.sin(0.05 * number + np.array([[0.0, 2.0, 4.0]]))
+            lengths = pressure_map.lengths_m(pressures)
+            stands = pressure_map.lengths_m(np.full((1, 3), 2e4))[0, 2]
+            lengths[0, 2] = stands + share * (lengths[0, 2] - stands)
+            lengths += rng.normal(0.0, noise_m, lengths.shape) if noise_m else 0.0
+            seen = replace(
+                WELL,
+                now_s=number * DT_S + 10.0 * share,
+                measured_pa=pressures[0].tolist(),
+                lengths_m=lengths[0].tolist(),
+            )
+            told[share] = still.look(seen)
+    assert all(fact in told[0.0] for fact in ("section 1, chamber 3", "stands"))
+    assert told[1.0] == ""
+
+
+def test_a_length_that_stands_while_nothing_moves_is_well() -> None:
+    lengths = PressureMap(ARM).lengths_m(np.array([[1e4, 2e4, 3e4]]))[0].tolist()
+    still = contradicted()
+    assert told_after(still, replace(WELL, lengths_m=lengths), 5.0) == inf
+    assert told_after(still, replace(WELL, lengths_m=[nan, lengths[1], nan]), 5.0) == inf
+
+
 @pytest.mark.parametrize("kind", [MeasurementOld, DeviceLost])
 def test_the_age_is_its_own_persistence(kind: type[Monitor]) -> None:
     age = made(kind, oldest_ms=150.0)

@@ -49,7 +49,7 @@ monitors.MONITORS += (SupplyHigh,)
 from pneuarm.controllers.arm.errors import ConfigurationError
 from pneuarm.service.cli.parser import build_parser, main
 from pneuarm.service.configuration.configuration import check, load
-from tests.service.safety.faulty import Faulty
+from tools.rig.faulty import Faulty
 from tools.docs.pages import make
 from tools.rig.simulated import Bench
 

@@ -13,7 +13,7 @@ from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import SetTipPose
 from pneuarm.service.safety.faults import FAULTS
 from tests.service.control.wild import assert_writes_within_limits_and_slew
-from tests.service.daemon.breakages import (
+from tools.faults.breakages import (
     always,
     bench_of,
     failing,
@@ -21,7 +21,7 @@ from tests.service.daemon.breakages import (
     frozen_sensor,
     silent_device,
 )
-from tests.service.safety.faulty import Faulty
+from tools.rig.faulty import Faulty
 from tools.rig.simulated import Bench
 
 

@@ -1,6 +1,6 @@
 """Every way in which the tests break the arm, and which fault must be found.
 
-`python -m tests.service.daemon.breakages` prints how fast, over twenty drawn arms and all
+`python -m tools.faults.breakages` prints how fast, over twenty drawn arms and all
 presets, and that the fastest legal moves of a whole arm raise nothing.
 """
 
@@ -23,7 +23,7 @@ from pneuarm.controllers.targets.targets import (
 from pneuarm.hardware.interface import Measurement
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.safety.faults import FAULTS
-from tests.service.safety.faulty import Faulty
+from tools.rig.faulty import Faulty
 from tools.rig.simulated import Bench
 
 #: A device that answers 50 times a second and rounds to a millibar.
@@ -155,6 +155,20 @@ def lengths_off(metres: float) -> Callable[[Bench, Faulty], None]:
     return do
 
 
+def length_stands(bench: Bench, faulty: Faulty) -> None:
+    """It stands where it is, with a little noise."""
+    newest, rng = faulty.newest, np.random.default_rng(0)
+    assert newest is not None
+    stands_m = float(newest.lengths_m[0, 0])
+
+    def read(measurement: Measurement, time_s: float) -> Measurement:
+        lengths = measurement.lengths_m.copy()
+        lengths[0, 0] = stands_m + rng.normal(0.0, 1e-4)
+        return replace(measurement, lengths_m=lengths)
+
+    faulty.alter = read
+
+
 def foreign_setpoint(bench: Bench, faulty: Faulty) -> None:
     def read(measurement: Measurement, time_s: float) -> Measurement:
         assert measurement.setpoints_pa is not None
@@ -188,6 +202,7 @@ BREAKAGES: dict[str, Breakage] = {
     "a leak of 10 % in a second": Breakage("leak", leak, holds=True),
     "the supply falls to 0.8 bar": Breakage("supply_low", always(supply_pa=0.8e5)),
     "a length sensor slips 90 mm": Breakage("model_contradicted", lengths_off(0.09)),
+    "a length sensor stands still": Breakage("model_contradicted", length_stands),
     "the tip is measured elsewhere": Breakage("model_contradicted", tip_off),
     "a length is estimated at 0.7 m": Breakage("estimate_diverges", lengths_off(0.5)),
     "a fifth of deadlines is missed": Breakage("loop_overruns", overruns),
