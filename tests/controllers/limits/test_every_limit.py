@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pneuarm.controllers.actuation.pressure_map import PressureMap
+from pneuarm.controllers.actuation.pressure_map import PressureMap, length_bounds_m
 from pneuarm.controllers.actuation.valve_lead import largest_rates_pa_s
 from pneuarm.controllers.arm.arm import Arm, HalfSpace, Response, Section, Sphere
 from pneuarm.controllers.arm.errors import InvalidInput
@@ -174,6 +174,12 @@ def test_a_bend_is_clipped_however_little_it_is_beyond_its_bound(beyond: float) 
         np.testing.assert_array_equal(clipped[others], lengths[others])
 
 
+def test_a_length_is_clipped_to_the_bound_that_it_is_beyond_and_else_left() -> None:
+    low, high = (float(bound[0, 0]) for bound in length_bounds_m(paper_arm()))
+    clipped = LengthLimit(paper_arm()).clip(np.array([[0.0, 0.21, 0.9]]))
+    np.testing.assert_array_equal(clipped, [[low, 0.21, high]])
+
+
 # --- where a limit stops the arm ----------------------------------------------------------------
 
 
@@ -263,6 +269,12 @@ def test_bounds_that_leave_no_length_are_refused_with_chamber_and_bounds() -> No
         refuse_contradictions(arm)
     facts = ("section 2", "chamber 1", "200 and 200 mm")
     assert [fact for fact in facts if fact not in str(refused.value)] == []
+
+
+def test_bounds_that_leave_one_length_alone_leave_none() -> None:
+    limit = LengthLimit(paper_arm())
+    limit._lower_m = limit._upper_m
+    assert "section 1, chamber 1" in limit.contradiction()
 
 
 def test_a_keep_out_around_the_arm_at_rest_is_refused_with_its_place_and_section() -> None:
