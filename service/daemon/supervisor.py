@@ -40,7 +40,9 @@ _PERIOD_S = 0.02
 
 #: A control process without a tick for this long is dead or stopped.
 HEARTBEAT_S = 0.1
-_FIRST_TICK_S = 20.0
+#: A slow or busy machine needs long to load and compile what a tick needs; a service manager waits
+#: for a minute.
+_FIRST_TICK_S = 50.0
 _END_S = 5.0
 
 #: A recorder that still gets further after this much of the end asks for more time than usual.
@@ -160,7 +162,7 @@ class Supervisor:
     def _start_control(self) -> None:
         """Start control alone, so that nothing delays its first tick, and wait for that.
 
-        Raises HardwareError where it ends before.
+        Raises HardwareError where it ends before, or does not get there.
         """
         shared, locks = self._shared, (self._arm_lock, self._device_lock)
         control = self._add(
@@ -169,7 +171,10 @@ class Supervisor:
         give_up_s = time.monotonic() + _FIRST_TICK_S
         while not self._ending and control.is_alive() and self._ticks.head() == 0:
             if time.monotonic() > give_up_s:
-                break
+                raise HardwareError(
+                    f"control made no tick within {_FIRST_TICK_S:g} s of its start: this machine "
+                    "is too busy or too slow; end other programs and start again"
+                )
             time.sleep(0.005)
         if not self._ending and not control.is_alive():
             cause = self._said(START_FAILED) or "see the lines above"
