@@ -53,6 +53,7 @@ class Steering:
         self._estimator = Estimator(arm)
         self._setpoints = Setpoints(arm, feedback, valves)
         self._vented_m = PressureMap(arm).lengths_m(np.zeros((arm.n_sections, 3)))
+        self._observer.prediction.restart(self._vented_m)
         self.tip_m = self._tip_before_m = np.zeros(3)
         self._target: Target | None = None
         self._camera_seen = self._near_reference = self._limited = self._too_fast = False

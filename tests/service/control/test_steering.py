@@ -6,6 +6,8 @@ import pytest
 from pneuarm.controllers.feedback.estimator import EstimateSource
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.targets.targets import CircleTarget, LengthsTarget, PressuresTarget
+from pneuarm.logs.schema import pneuarm_pb2 as pb
+from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import RequestMode
 from tests.service.control.test_loop_calibrated import calibrated_configuration
@@ -34,6 +36,20 @@ def test_the_measured_tip_takes_the_arm_to_its_target(rig: CameraRig) -> None:
     assert 0.0 < last["tip_estimated_sigma_m"] < 2e-3
     for name in ("reference_position_m", "reference_velocity_m_s", "tip_offset_m"):
         assert np.isfinite(ticks[name]).all()
+
+
+def test_a_camera_that_sees_the_vented_arm_from_the_start_is_believed() -> None:
+    tables = calibrated_configuration().model_dump(exclude_none=True)
+    section = tables["arm"]["sections"][0] | {"axial_compliance_mm_per_n": 3.0}
+    tables["arm"]["sections"] = [section]  # it hangs further below its rest lengths than may stand
+    configuration = Configuration.model_validate(tables)
+    rig = CameraRig(configuration)
+    rig.run(1.0)
+    ticks = rig.ticks()
+    hangs_m = np.linalg.norm(ticks["tip_model_position_m"][-1] - HOME)
+    assert hangs_m > configuration.feedback.settings().still_max_m
+    assert np.ptp(ticks["tip_model_position_m"], axis=0).max() < 1e-6
+    assert {event.code for event in rig.events if event.level >= pb.WARNING} == set()
 
 
 def test_a_target_is_reached_although_the_correction_never_rests() -> None:
