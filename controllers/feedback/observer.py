@@ -7,7 +7,10 @@ correction with which the laws see the tip. The prediction is of what was really
 nothing winds up where the arm cannot follow.
 
 A sensor may lie, so it moves the command by a bounded amount only: the correction has a largest
-size, and a tip that does not go along with the model's is not followed at all.
+size, and a tip that does not go along with the model's is not followed at all. A model may be wrong
+by more than a correction bears: where the tip swings although it is to stand, the correction gets
+the period of the swing as its time constant. Where the phase of what is corrected makes it swing at
+a frequency omega, it then crosses unity gain at omega / 2 pi, where that phase is far from it.
 """
 
 import math
@@ -19,6 +22,7 @@ import numpy as np
 from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.feedback.goes_along import GoesAlong
 from pneuarm.controllers.feedback.prediction import Prediction
+from pneuarm.controllers.feedback.swing_watch import SwingWatch
 from pneuarm.controllers.geometry.rotations import (
     quaternion_from_rotation,
     rotation_from_vector,
@@ -37,6 +41,9 @@ _WHEN_STILL = 2.0
 
 #: A correction that was at its largest no longer is below this share of it.
 _BACK_SHARE = 0.9
+
+#: A correction that would have to be slower (s) than this stays as it is.
+SLOWEST_S = 10.0
 
 #: An estimate is never told to be better than this (m): no camera sees an arm more exactly.
 _LEAST_SIGMA_M = 5e-5
@@ -80,17 +87,24 @@ class Verdict(Enum):
     ACCEPTED_ANEW = auto()
     NOT_ALONG = auto()
     LATE = auto()
+    #: It was taken, and the tip is found to swing.
+    SWINGS = auto()
 
 
 class TipObserver:
     """The correction, from measured tip poses of known age.
 
     ``offset_m`` (3,) and ``rotation`` (3, 3) are what :meth:`Controller.set_correction` takes. They
-    are replaced, never written into.
+    are replaced, never written into. A tip that goes to and fro by less than ``still_m`` stands.
     """
 
-    def __init__(self, arm: Arm, settings: FeedbackSettings, period_s: float) -> None:
+    def __init__(
+        self, arm: Arm, settings: FeedbackSettings, period_s: float, still_m: float
+    ) -> None:
         self._settings, self._period_s = settings, period_s
+        #: How fast the correction follows; infinite where it stays as it is.
+        self.time_constant_s = settings.time_constant_s
+        self.swing = SwingWatch(still_m)
         self._delay_s = arm.response.delay_s
         self.prediction = Prediction(arm, period_s)
         self.offset_m, self.rotation = np.zeros(3), np.eye(3)
@@ -115,8 +129,14 @@ class TipObserver:
         self._candidate: Array | None = None
         self._candidate_s = 0.0
 
-    def measure(self, position_m: Array, rotation: Array, waited_s: float) -> Verdict:
-        """Take a pose that arrived so long before this tick."""
+    def forget_swings(self) -> None:
+        """Let the correction be as fast again as the settings say."""
+        self.time_constant_s = self._settings.time_constant_s
+
+    def measure(
+        self, position_m: Array, rotation: Array, waited_s: float, stands: bool = False
+    ) -> Verdict:
+        """Take a pose that arrived so long before this tick; ``stands``: the tip is to stand."""
         if waited_s > self._settings.timeout_s:
             self.refused += 1
             return Verdict.LATE
@@ -144,7 +164,13 @@ class TipObserver:
         if self._along.stands:
             self._trusted_before = self._trusted
         self._follow_turn(rotation_vector(rotation @ turned.T))
-        return verdict
+        if math.isinf(self.time_constant_s):
+            return verdict
+        if not self.swing.look(position_m, pause_s, stands):
+            return verdict
+        slower_s = max(2.0 * self.time_constant_s, self.swing.period_s)
+        self.time_constant_s = slower_s if slower_s <= SLOWEST_S else math.inf
+        return Verdict.SWINGS
 
     def _give_back(self) -> None:
         """Go back to the difference before the tip ceased to go along: what came since is wrong."""
@@ -197,7 +223,7 @@ class TipObserver:
         self._turn_limited = _norm(turn) > self._settings.turn_max_rad
         if self._turn_limited:
             return
-        share = min(1.0, 0.01 / self._settings.time_constant_s)
+        share = min(1.0, 0.01 / self.time_constant_s)
         self._turn = self._turn + share * (turn - self._turn)
         self.rotation = rotation_from_vector(self._turn)
         self.quaternion_xyzw = quaternion_from_rotation(self.rotation)
@@ -218,7 +244,7 @@ class TipObserver:
         difference = self._wanted - self.offset_m
         size = _norm(difference)
         if size > self._settings.deadband_m:
-            share = self._period_s / self._settings.time_constant_s
+            share = self._period_s / self.time_constant_s
             if _norm(self._quick - self._slow) < _STILL_M:
                 share *= _WHEN_STILL
             share = min(share, self._settings.rate_max_m_s * self._period_s / size)

@@ -20,6 +20,7 @@ from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
 from pneuarm.controllers.reference.follower import Follower, lead_of
 from pneuarm.controllers.reference.trajectory import ReferenceLimits
+from pneuarm.controllers.targets.same import same
 from pneuarm.controllers.targets.targets import ShapeTarget, Target
 from pneuarm.hardware.interface import Measurement
 from pneuarm.logs.schema import pneuarm_pb2 as pb
@@ -48,7 +49,9 @@ class Steering:
         quick = replace(arm, response=valves.behind)
         gain_per_s = control.gain_per_s
         self._follower = Follower(arm, reference, lead_of(quick.response), gain_per_s, period_s)
-        self._observer = TipObserver(quick, feedback, period_s)
+        # What goes to and fro around a reached place, within what counts as reached, stands.
+        still_m = 2.0 * control.reached_tolerance_m
+        self._observer = TipObserver(quick, feedback, period_s, still_m)
         self._notch = Notch(arm.response)
         self._estimator = Estimator(arm)
         self._setpoints = Setpoints(arm, feedback, valves)
@@ -56,6 +59,7 @@ class Steering:
         self._observer.prediction.restart(self._vented_m)
         self.tip_m = self._tip_before_m = np.zeros(3)
         self._target: Target | None = None
+        self._same_again = False
         self._camera_seen = self._near_reference = self._limited = self._too_fast = False
         self._verdict = Verdict.TAKEN
         self._told_error = ""
@@ -77,6 +81,7 @@ class Steering:
         target, controller = command.target, self._controller
         velocity = (self.tip_m - self._tip_before_m) / self._dt_s
         self._follower.set_target(target, command.received_ns * 1e-9, controller.tip(), velocity)
+        self._same_again = target.has_end and same(target, self._target)
         self._target = target
         if not self._follower.follows:
             controller.set_target(target)
@@ -109,7 +114,7 @@ class Steering:
     def stop(self) -> None:
         """Follow nothing any more."""
         self._follower.forget()
-        self._target = None
+        self._target, self._same_again = None, False
         self._controller.set_target(None)
 
     def start(self, measured_pa: Array | None) -> None:
@@ -118,10 +123,12 @@ class Steering:
         None goes on from the pressures that are held.
         """
         self._setpoints.start(measured_pa)
+        if measured_pa is not None:
+            self._observer.forget_swings()
         self._controller.set_hysteresis_share(self._setpoints.hysteresis_share)
         self._controller.start_from(self.held_pa)
         self._follower.forget()
-        self._target = None
+        self._target, self._same_again = None, False
         self._notch.restart(self._observer.offset_m)
         self._controller.set_correction(self._observer.offset_m, self._observer.rotation)
         self.tip_m = self._tip_before_m = self._controller.tip().position_m
@@ -130,8 +137,10 @@ class Steering:
         """Take a measured tip pose, or say once why not."""
         rotation = rotation_from_quaternion(pose.quaternion_xyzw)
         waited_s = (now_ns - pose.received_ns) * 1e-9
-        verdict = self._observer.measure(pose.position_m, rotation, waited_s)
+        verdict = self._observer.measure(pose.position_m, rotation, waited_s, self._is_to_stand)
         before, self._verdict = self._verdict, verdict
+        if verdict is Verdict.SWINGS:
+            return self._swings_notice()
         if verdict is not before and verdict in (
             Verdict.REFUSED,
             Verdict.NOT_ALONG,
@@ -141,6 +150,25 @@ class Steering:
         if verdict is Verdict.ACCEPTED_ANEW:
             return Notice(pb.INFO, "tip_pose_accepted", "the tip poses after the jump are taken")
         return None
+
+    @property
+    def _is_to_stand(self) -> bool:
+        """Whether the tip is to stand where it is: what then moves it is no target."""
+        return self._follower.arrived if self._follower.follows else self._same_again
+
+    def _swings_notice(self) -> Notice:
+        """Say that the correction is turned down, how far and for how long."""
+        slow_s, swing = self._observer.time_constant_s, self._observer.swing
+        now = "stays as it is" if math.isinf(slow_s) else f"follows in {slow_s:.1f} s only"
+        return Notice(
+            pb.WARNING,
+            "correction_swings",
+            f"the tip swings by {1e3 * swing.way_m:.1f} mm every {swing.period_s:.1f} s where it "
+            f"is to stand: its correction {now}, until the arm is armed anew from idle",
+            "valves, camera or body answer otherwise than [arm.response] and "
+            "feedback.camera_delay_ms say, or something else moves the arm",
+            "measure the response with `pneuarm calibrate`, and the camera's delay",
+        )
 
     def _disbelieved(self, verdict: Verdict, waited_s: float) -> Notice:
         """Say why measured poses are not taken."""

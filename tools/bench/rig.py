@@ -52,7 +52,8 @@ class CameraRig:
     """Daemon's loop, arm and camera; one tick is one period of the configuration.
 
     The camera takes ``camera_hz`` poses a second, which arrive ``delay_s`` later, with
-    ``noise_m`` on every axis. ``camera`` switches it.
+    ``noise_m`` on every axis. ``camera`` switches it. ``device`` stands in the place of the
+    configuration's.
     """
 
     def __init__(
@@ -63,11 +64,12 @@ class CameraRig:
         camera_hz: float = 100.0,
         delay_s: float = 0.01,
         noise_m: float = 1e-4,
+        device: Hardware | None = None,
     ) -> None:
         self.arm = configuration.build_arm()
         rate_hz = configuration.control.rate_hz
         self.period_ns = round(1e9 / rate_hz)
-        self.hardware = FilmedArm(backends.build(configuration, self.arm))
+        self.hardware = FilmedArm(device or backends.build(configuration, self.arm))
         self.events: list[pb.Event] = []
         settings = LoopSettings.of(configuration, _TIMEOUTS, _START_NS, _START_NS)
         self.hardware.connect()

@@ -10,7 +10,7 @@ from pneuarm.controllers.kinematics.compiled import CompiledKinematics
 from tools.rig.arms import paper_arm
 
 ARM = paper_arm()
-PERIOD_S = 2e-3
+PERIOD_S, STILL_M = 2e-3, 1e-3
 SETTINGS = FeedbackSettings(rate_max_m_s=0.1)
 OFFSET_M = np.array([0.012, -0.004, 0.006])
 TURN = rotation_from_vector(np.array([0.05, -0.02, 0.1]))
@@ -20,7 +20,7 @@ class Setup:
     """An observer, and an arm that is where the model says but for an offset and a turn."""
 
     def __init__(self) -> None:
-        self.observer = TipObserver(ARM, SETTINGS, PERIOD_S)
+        self.observer = TipObserver(ARM, SETTINGS, PERIOD_S, STILL_M)
         self.lengths = ARM.rest_lengths_m + np.array([[0.01, 0.0, -0.01]])
         tip = CompiledKinematics(ARM).evaluate(self.lengths)
         self.position, self.rotation = tip.position_m.copy(), tip.rotation.copy()
@@ -91,7 +91,7 @@ def test_poses_that_jump_about_are_never_taken() -> None:
 
 
 def test_a_pose_is_compared_with_the_prediction_of_its_own_time() -> None:
-    observer = TipObserver(ARM, SETTINGS, PERIOD_S)
+    observer = TipObserver(ARM, SETTINGS, PERIOD_S, STILL_M)
     history = []
     for number in range(1500):
         sway = 0.02 * np.sin(0.01 * number)

@@ -1,0 +1,99 @@
+"""Whether a measured tip that is to stand swings, and does not cease to.
+
+A correction whose model is wrong, by dead time above all, feeds a swing that does not die out. It
+is told from one that does by its turns: so many in a row along an axis, each way between them
+larger than what counts as standing and what the camera's noise explains, and the last still about
+as large as the largest.
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from pneuarm.controllers.arm.arm import Array
+
+#: So many ways in a row are a swing whose last is at least this share of the largest. A mode of
+#: damping ratio z leaves exp(-pi z) from one way to the next: one above 0.03 dies out sooner.
+_WAYS, _LAST_SHARE = 5, 0.7
+
+#: A way that is longer than so many standard deviations of the camera's noise is none of it. They
+#: are found over about so many poses.
+_NOISE_TIMES, _NOISE_POSES = 8.0, 50
+
+#: Fourth differences of poses: a motion leaves little in them, noise of one variance 70 times it. A
+#: swing is seen where the camera takes six poses a period.
+_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+
+
+class _Axis:
+    """One coordinate of the tip, and the ways between its turns."""
+
+    def __init__(self, position_m: float) -> None:
+        self._turn_m = self._far_m = position_m
+        self._sign = 0.0
+        self.ways_m: deque[float] = deque(maxlen=_WAYS)
+        self.turned_s: deque[float] = deque(maxlen=_WAYS)
+
+    def look(self, position_m: float, at_s: float, least_m: float) -> bool:
+        """Take a position; return whether it has just turned, once more, in a lasting swing."""
+        if self._sign == 0.0 and abs(position_m - self._turn_m) > least_m:
+            self._sign = 1.0 if position_m > self._turn_m else -1.0
+        if self._sign * (position_m - self._far_m) >= 0.0:
+            self._far_m = position_m
+            return False
+        if abs(position_m - self._far_m) <= least_m:
+            return False
+        self.ways_m.append(abs(self._far_m - self._turn_m))
+        self.turned_s.append(at_s)
+        self._turn_m, self._far_m, self._sign = self._far_m, position_m, -self._sign
+        return len(self.ways_m) == _WAYS and self.ways_m[-1] >= _LAST_SHARE * max(self.ways_m)
+
+
+class SwingWatch:
+    """Looks at a measured tip; a way from turn to turn of ``least_m`` is the smallest that counts.
+
+    ``way_m`` and ``period_s`` are of the swing that was found last.
+    """
+
+    def __init__(self, least_m: float) -> None:
+        self._least_m = least_m
+        self.way_m = self.period_s = 0.0
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        self._axes: list[_Axis] = []
+        self._newest_m: deque[Array] = deque(maxlen=len(_DIFFERENCE))
+        self._variance_m2 = np.zeros(3)
+        self._at_s, self._poses = 0.0, 0
+
+    def look(self, position_m: Array, pause_s: float, stands: bool) -> bool:
+        """Take a tip (3,) and the time since the last; return whether a swing is found, anew.
+
+        Where the tip is not to stand nothing is told from its motion.
+        """
+        if not stands:
+            self._begin_anew()
+            return False
+        self._axes = self._axes or [_Axis(value_m) for value_m in position_m.tolist()]
+        self._at_s += pause_s
+        least_m = max(self._least_m, _NOISE_TIMES * self._noise_m(position_m))
+        tip = zip(self._axes, position_m.tolist(), strict=True)
+        swings = [axis for axis, value_m in tip if axis.look(value_m, self._at_s, least_m)]
+        if not swings:
+            return False
+        turned_s = swings[0].turned_s
+        self.way_m = max(axis.ways_m[-1] for axis in self._axes if axis.ways_m)
+        self.period_s = 2.0 * (turned_s[-1] - turned_s[0]) / (_WAYS - 1)
+        self._begin_anew()
+        return True
+
+    def _noise_m(self, position_m: Array) -> float:
+        """Learn the camera's noise; return its standard deviation along the worst axis."""
+        self._newest_m.append(position_m)
+        if len(self._newest_m) == len(_DIFFERENCE):
+            self._poses += 1
+            difference_m = _DIFFERENCE @ np.stack(self._newest_m)
+            news_m2 = difference_m**2 / (_DIFFERENCE @ _DIFFERENCE) - self._variance_m2
+            self._variance_m2 = self._variance_m2 + news_m2 / min(self._poses, _NOISE_POSES)
+        return math.sqrt(self._variance_m2.max())
