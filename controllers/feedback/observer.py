@@ -8,7 +8,7 @@ nothing winds up where the arm cannot follow.
 
 A sensor may lie, so it moves the command by a bounded amount only: the correction has a largest
 size, and a tip that does not go along with the model's is not followed at all. A model may be wrong
-by more than a correction bears: where the tip swings although it is to stand, the correction gets
+by more than a correction bears: where the tip swings around where it is to be, the correction gets
 the period of the swing as its time constant. Where the phase of what is corrected makes it swing at
 a frequency omega, it then crosses unity gain at omega / 2 pi, where that phase is far from it.
 """
@@ -23,6 +23,7 @@ from pneuarm.controllers.arm.arm import Arm, Array
 from pneuarm.controllers.feedback.goes_along import GoesAlong
 from pneuarm.controllers.feedback.prediction import Prediction
 from pneuarm.controllers.feedback.swing_watch import SwingWatch
+from pneuarm.controllers.geometry.moving_point import MovingPoint
 from pneuarm.controllers.geometry.rotations import (
     quaternion_from_rotation,
     rotation_from_vector,
@@ -41,6 +42,11 @@ _WHEN_STILL = 2.0
 
 #: A correction that was at its largest no longer is below this share of it.
 _BACK_SHARE = 0.9
+
+#: The integral correction of what answers after an effective dead time theta has the time constant
+#: 2 theta at least (Skogestad, Simple analytic rules for model reduction and PID controller tuning,
+#: J. Process Control 13, 2003: tau_c = theta, K_I = 1 / (tau_c + theta) where there is no lag).
+_DEAD_TIMES = 2.0
 
 #: A correction that would have to be slower (s) than this stays as it is.
 SLOWEST_S = 10.0
@@ -102,9 +108,11 @@ class TipObserver:
         self, arm: Arm, settings: FeedbackSettings, period_s: float, still_m: float
     ) -> None:
         self._settings, self._period_s = settings, period_s
-        #: How fast the correction follows; infinite where it stays as it is.
-        self.time_constant_s = settings.time_constant_s
         self.swing = SwingWatch(still_m)
+        self._turned_down_s = 0.0
+        #: What comes between a correction and the pose that shows it, but for the camera's pause.
+        self._loop_s = arm.response.delay_s + arm.response.slower_lag_s + settings.delay_s
+        self._pause_s = 0.0
         self._delay_s = arm.response.delay_s
         self.prediction = Prediction(arm, period_s)
         self.offset_m, self.rotation = np.zeros(3), np.eye(3)
@@ -130,13 +138,19 @@ class TipObserver:
         self._candidate_s = 0.0
 
     def forget_swings(self) -> None:
-        """Let the correction be as fast again as the settings say."""
-        self.time_constant_s = self._settings.time_constant_s
+        """Let the correction be as fast again as it was before any swing."""
+        self._turned_down_s = 0.0
+
+    @property
+    def time_constant_s(self) -> float:
+        """How fast the correction follows; infinite where it stays as it is."""
+        steady_s = _DEAD_TIMES * (self._loop_s + self._pause_s)
+        return max(self._settings.time_constant_s, steady_s, self._turned_down_s)
 
     def measure(
-        self, position_m: Array, rotation: Array, waited_s: float, stands: bool = False
+        self, position_m: Array, rotation: Array, waited_s: float, wanted: MovingPoint | None = None
     ) -> Verdict:
-        """Take a pose that arrived so long before this tick; ``stands``: the tip is to stand."""
+        """Take a pose that arrived so long before this tick, and where it is to be, where known."""
         if waited_s > self._settings.timeout_s:
             self.refused += 1
             return Verdict.LATE
@@ -163,13 +177,14 @@ class TipObserver:
             self._trusted = self._fast
         if self._along.stands:
             self._trusted_before = self._trusted
-        self._follow_turn(rotation_vector(rotation @ turned.T))
-        if math.isinf(self.time_constant_s):
+        self._follow_turn(rotation_vector(rotation @ turned.T), pause_s)
+        if wanted is None or math.isinf(self.time_constant_s):
+            self.swing.begin_anew()
             return verdict
-        if not self.swing.look(position_m, pause_s, stands):
+        if not self.swing.look(position_m, wanted, pause_s):
             return verdict
         slower_s = max(2.0 * self.time_constant_s, self.swing.period_s)
-        self.time_constant_s = slower_s if slower_s <= SLOWEST_S else math.inf
+        self._turned_down_s = slower_s if slower_s <= SLOWEST_S else math.inf
         return Verdict.SWINGS
 
     def _give_back(self) -> None:
@@ -203,14 +218,15 @@ class TipObserver:
         return Verdict.ACCEPTED_ANEW
 
     def _take(self, residual: Array, position_m: Array, continued: bool) -> None:
-        pause_s = min(self._since_taken_s, 1.0)
+        self._pause_s = pause_s = min(self._since_taken_s, 1.0)
         self._residual = residual
         if continued:
             change = residual - self._fast
             share = 1.0 - math.exp(-pause_s / _FAST_S)
             self._fast = self._fast + share * change
             self._quick = self._quick + min(1.0, pause_s / _QUICK_S) * (position_m - self._quick)
-            self._slow = self._slow + min(1.0, pause_s / _SLOW_S) * (position_m - self._slow)
+            share = 1.0 - math.exp(-pause_s / _SLOW_S)
+            self._slow = self._slow + share * (position_m - self._slow)
             rest = math.exp(-pause_s / _SCATTER_S)
             self._variance_m2 += (1.0 - rest) * (float(change @ change) - self._variance_m2)
         else:
@@ -218,12 +234,12 @@ class TipObserver:
             self._variance_m2 = (0.1 * self._settings.model_sigma_m) ** 2
         self._since_taken_s, self.seen, self._returns = 0.0, True, False
 
-    def _follow_turn(self, turn: Array) -> None:
-        """Follow a measured turn (3,); one that is larger than allowed changes nothing."""
+    def _follow_turn(self, turn: Array, pause_s: float) -> None:
+        """Follow a measured turn (3,) after a pause; one larger than allowed changes nothing."""
         self._turn_limited = _norm(turn) > self._settings.turn_max_rad
         if self._turn_limited:
             return
-        share = min(1.0, 0.01 / self.time_constant_s)
+        share = min(1.0, pause_s / self.time_constant_s)
         self._turn = self._turn + share * (turn - self._turn)
         self.rotation = rotation_from_vector(self._turn)
         self.quaternion_xyzw = quaternion_from_rotation(self.rotation)

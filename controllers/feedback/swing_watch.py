@@ -1,25 +1,31 @@
-"""Whether a measured tip that is to stand swings, and does not cease to.
+"""Whether a measured tip swings around where it is to be, and does not cease to.
 
 A correction whose model is wrong, by dead time above all, feeds a swing that does not die out. It
 is told from one that does by its turns: so many in a row along an axis, each way between them
-larger than what counts as standing and what the camera's noise explains, and the last still about
-as large as the largest.
+larger than what counts as standing and what the camera's noise explains, all of about one size, and
+one period as long as the next.
+Where the tip is to move, its valves and chambers turn with the reference, and its error with them:
+a swing has all of its turns while the reference's acceleration changes its sign once along its
+three axes at most. On a circle it is seen if it is four times as quick.
 """
 
 import math
 from collections import deque
+from collections.abc import Collection
 
 import numpy as np
 
 from pneuarm.controllers.arm.arm import Array
+from pneuarm.controllers.geometry.moving_point import MovingPoint
 
-#: So many ways in a row are a swing whose last is at least this share of the largest. A mode of
-#: damping ratio z leaves exp(-pi z) from one way to the next: one above 0.03 dies out sooner.
-_WAYS, _LAST_SHARE = 5, 0.7
+#: So many ways in a row are a swing whose smallest is at least this share of the largest, and its
+#: shortest period of the longest. A mode of damping ratio z leaves exp(-pi z) from one way to the
+#: next: one above 0.03 dies out sooner.
+_WAYS, _ALIKE_SHARE = 5, 0.7
 
 #: A way that is longer than so many standard deviations of the camera's noise is none of it. They
 #: are found over about so many poses.
-_NOISE_TIMES, _NOISE_POSES = 8.0, 50
+_NOISE_TIMES, _NOISE_POSES = 8.0, 20
 
 #: Fourth differences of poses: a motion leaves little in them, noise of one variance 70 times it. A
 #: swing is seen where the camera takes six poses a period.
@@ -47,7 +53,17 @@ class _Axis:
         self.ways_m.append(abs(self._far_m - self._turn_m))
         self.turned_s.append(at_s)
         self._turn_m, self._far_m, self._sign = self._far_m, position_m, -self._sign
-        return len(self.ways_m) == _WAYS and self.ways_m[-1] >= _LAST_SHARE * max(self.ways_m)
+        return len(self.ways_m) == _WAYS and _alike(self.ways_m) and _alike(self.periods_s)
+
+    @property
+    def periods_s(self) -> list[float]:
+        """From each turn to the one after the next."""
+        turned_s = list(self.turned_s)
+        return [after - before for before, after in zip(turned_s, turned_s[2:], strict=False)]
+
+
+def _alike(values: Collection[float]) -> bool:
+    return min(values) >= _ALIKE_SHARE * max(values)
 
 
 class SwingWatch:
@@ -59,34 +75,47 @@ class SwingWatch:
     def __init__(self, least_m: float) -> None:
         self._least_m = least_m
         self.way_m = self.period_s = 0.0
-        self._begin_anew()
+        self.begin_anew()
 
-    def _begin_anew(self) -> None:
+    def begin_anew(self) -> None:
+        """Take the next tip as the first one."""
         self._axes: list[_Axis] = []
         self._newest_m: deque[Array] = deque(maxlen=len(_DIFFERENCE))
         self._variance_m2 = np.zeros(3)
+        self._signs = [0.0, 0.0, 0.0]
+        #: When the wanted acceleration has changed its sign, the last two times.
+        self._changed_s: deque[float] = deque(maxlen=2)
         self._at_s, self._poses = 0.0, 0
 
-    def look(self, position_m: Array, pause_s: float, stands: bool) -> bool:
-        """Take a tip (3,) and the time since the last; return whether a swing is found, anew.
+    def look(self, position_m: Array, wanted: MovingPoint, pause_s: float) -> bool:
+        """Take a tip (3,), where it is wanted, and the time since the last tip.
 
-        Where the tip is not to stand nothing is told from its motion.
+        Return whether a swing is found, anew.
         """
-        if not stands:
-            self._begin_anew()
-            return False
-        self._axes = self._axes or [_Axis(value_m) for value_m in position_m.tolist()]
         self._at_s += pause_s
-        least_m = max(self._least_m, _NOISE_TIMES * self._noise_m(position_m))
-        tip = zip(self._axes, position_m.tolist(), strict=True)
+        self._follow(wanted.acceleration)
+        off_m = position_m - wanted.position[:3]
+        self._axes = self._axes or [_Axis(value_m) for value_m in off_m.tolist()]
+        least_m = max(self._least_m, _NOISE_TIMES * self._noise_m(off_m))
+        tip = zip(self._axes, off_m.tolist(), strict=True)
         swings = [axis for axis, value_m in tip if axis.look(value_m, self._at_s, least_m)]
         if not swings:
             return False
-        turned_s = swings[0].turned_s
+        swing = swings[0]
+        if len(self._changed_s) == 2 and self._changed_s[0] > swing.turned_s[0]:
+            return False
         self.way_m = max(axis.ways_m[-1] for axis in self._axes if axis.ways_m)
-        self.period_s = 2.0 * (turned_s[-1] - turned_s[0]) / (_WAYS - 1)
-        self._begin_anew()
+        self.period_s = sum(swing.periods_s) / len(swing.periods_s)
+        self.begin_anew()
         return True
+
+    def _follow(self, acceleration: list[float]) -> None:
+        """See whether the wanted acceleration, of three axes or more, has changed its sign."""
+        for axis, value in enumerate(acceleration[:3]):
+            if value * self._signs[axis] < 0.0:
+                self._changed_s.append(self._at_s)
+            if value != 0.0:
+                self._signs[axis] = math.copysign(1.0, value)
 
     def _noise_m(self, position_m: Array) -> float:
         """Learn the camera's noise; return its standard deviation along the worst axis."""

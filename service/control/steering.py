@@ -15,6 +15,7 @@ from pneuarm.controllers.controller import Controller
 from pneuarm.controllers.feedback.estimator import Estimator
 from pneuarm.controllers.feedback.notch import Notch
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
+from pneuarm.controllers.geometry.moving_point import MovingPoint
 from pneuarm.controllers.geometry.rotations import rotation_from_quaternion
 from pneuarm.controllers.laws.settings import ControlSettings
 from pneuarm.controllers.reach.reach import Reach
@@ -31,6 +32,8 @@ from pneuarm.service.processes.pipe import SetTarget, SetTipPose
 
 #: What may happen in every tick is told this often at most.
 _TELL_EVERY_S = 10.0
+
+_STANDS = MovingPoint([0.0] * 3, [0.0] * 3, [0.0] * 3)
 
 
 class Steering:
@@ -137,7 +140,7 @@ class Steering:
         """Take a measured tip pose, or say once why not."""
         rotation = rotation_from_quaternion(pose.quaternion_xyzw)
         waited_s = (now_ns - pose.received_ns) * 1e-9
-        verdict = self._observer.measure(pose.position_m, rotation, waited_s, self._is_to_stand)
+        verdict = self._observer.measure(pose.position_m, rotation, waited_s, self._wanted_tip)
         before, self._verdict = self._verdict, verdict
         if verdict is Verdict.SWINGS:
             return self._swings_notice()
@@ -152,9 +155,14 @@ class Steering:
         return None
 
     @property
-    def _is_to_stand(self) -> bool:
-        """Whether the tip is to stand where it is: what then moves it is no target."""
-        return self._follower.arrived if self._follower.follows else self._same_again
+    def _wanted_tip(self) -> MovingPoint | None:
+        """Where the tip is to be, or any point where it is to stand; None where that is not known.
+
+        Targets without a reference have it stand once they have been sent again.
+        """
+        if self._follower.follows:
+            return self._follower.motion
+        return _STANDS if self._same_again else None
 
     def _swings_notice(self) -> Notice:
         """Say that the correction is turned down, how far and for how long."""
@@ -163,8 +171,8 @@ class Steering:
         return Notice(
             pb.WARNING,
             "correction_swings",
-            f"the tip swings by {1e3 * swing.way_m:.1f} mm every {swing.period_s:.1f} s where it "
-            f"is to stand: its correction {now}, until the arm is armed anew from idle",
+            f"the tip swings by {1e3 * swing.way_m:.1f} mm every {swing.period_s:.1f} s around "
+            f"where it is to be: its correction {now}, until the arm is armed anew from idle",
             "valves, camera or body answer otherwise than [arm.response] and "
             "feedback.camera_delay_ms say, or something else moves the arm",
             "measure the response with `pneuarm calibrate`, and the camera's delay",

@@ -61,7 +61,9 @@ class FeedbackConfig(Table):
             le=10000,
             description=(
                 "how fast the correction follows the measured difference; twice as fast while the "
-                "tip stands still"
+                "tip stands still, and never faster than twice what lies between a correction and "
+                "the pose that shows it: dead time and lag of the valves behind their lead, age "
+                "and pause of the poses"
             ),
         ),
     ] = 170.0

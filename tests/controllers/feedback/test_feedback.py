@@ -1,8 +1,14 @@
 """The observer: it finds what the model misses, and moves nothing when the camera goes or lies."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from pneuarm.controllers.arm.arm import Response
 from pneuarm.controllers.feedback.estimator import EstimateSource, Estimator
 from pneuarm.controllers.feedback.observer import FeedbackSettings, TipObserver, Verdict
 from pneuarm.controllers.geometry.rotations import rotation_from_vector
@@ -47,6 +53,28 @@ def test_it_converges_to_offset_and_turn_and_never_faster_than_its_rate() -> Non
     assert setup.observer.offset_m == pytest.approx(OFFSET_M, abs=SETTINGS.deadband_m)
     assert setup.observer.rotation == pytest.approx(TURN, abs=1e-4)
     assert setup.largest_step <= SETTINGS.rate_max_m_s * PERIOD_S * (1 + 1e-9)
+
+
+@given(st.floats(0.0, 0.3), st.floats(2e-3, 0.3), st.floats(0.0, 0.1), st.floats(5e-3, 0.2))
+def test_it_is_never_faster_than_its_loop_allows(
+    delay_s: float, lag_s: float, camera_late_s: float, camera_pause_s: float
+) -> None:
+    response = Response(delay_s=delay_s, filling_lag_s=0.5 * lag_s, exhausting_lag_s=lag_s)
+    settings = replace(SETTINGS, delay_s=camera_late_s, timeout_s=1.0)
+    observer = TipObserver(replace(ARM, response=response), settings, PERIOD_S, STILL_M)
+    away_m = CompiledKinematics(ARM).evaluate(ARM.rest_lengths_m).position_m + OFFSET_M
+    ticks = math.ceil(camera_pause_s / PERIOD_S)
+    moved_m = []
+    for tick in range(3 * ticks):
+        before_m = observer.offset_m
+        if tick % ticks == 0:
+            observer.measure(away_m, np.eye(3), 0.0)
+        observer.step(ARM.rest_lengths_m)
+        left_m = np.linalg.norm(OFFSET_M - before_m)
+        moved_m.append(np.linalg.norm(observer.offset_m - before_m) / left_m)
+    loop_s = delay_s + lag_s + camera_late_s + camera_pause_s
+    # Twice as fast where the tip stands still.
+    assert max(moved_m[ticks + 1 :]) <= PERIOD_S / loop_s * (1.0 + 1e-9)
 
 
 def test_a_lost_camera_freezes_the_offset_and_its_return_does_not_jump() -> None:

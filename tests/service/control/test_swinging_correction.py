@@ -12,6 +12,7 @@ from pneuarm.service.configuration.configuration import Configuration
 from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.processes.pipe import RequestMode
 from tests.service.control.test_loop_calibrated import calibrated_configuration
+from tools.bench import random_arms
 from tools.bench.responses import LopsidedArm
 from tools.bench.rig import CameraRig
 
@@ -56,8 +57,8 @@ def told(rig: CameraRig) -> list[pb.Event]:
 
 @pytest.mark.parametrize(
     ("valves", "swings_s"),
-    [(SLOW, 4.0), (SLOWER, 10.0), (LATE, 8.0)],
-    ids=["slow", "slower", "late"],
+    [(SLOWER, 10.0), (LATE, 8.0)],
+    ids=["slower", "late"],
 )
 def test_a_correction_that_swings_is_turned_down_and_told_once(
     valves: tuple[float, float, float], swings_s: float
@@ -74,8 +75,20 @@ def test_a_correction_that_swings_is_turned_down_and_told_once(
     assert "`pneuarm calibrate`" in event.remedy
 
 
+def test_a_swing_on_the_way_round_a_slow_circle_is_turned_down_too() -> None:
+    rig = rig_behind(LATE)
+    circle_m = CircleTarget((0.0, 0.0, 0.2), (1, 0, 0), (0, 1, 0), 0.03, 0.1)
+    before = rig.circle(circle_m, 8.0)
+    after = rig.circle(circle_m, 24.0)
+    assert len(told(rig)) == 1
+    last = round(5.0 * RATE_HZ)
+    heights_m = [np.ptp(ticks["tip_true_position_m"][-last:, 2]) for ticks in (before, after)]
+    assert heights_m[0] > 0.03
+    assert heights_m[1] < 0.01
+
+
 def test_it_stays_turned_down_through_a_hold_and_is_tried_anew_from_idle() -> None:
-    rig = rig_behind(SLOW)
+    rig = rig_behind(LATE)
     rig.to(GOAL, 12.0)
     assert len(told(rig)) == 1
     rig.rest(RequestMode(ModeEvent.HOLD, 4, "bench"), 0.5)
@@ -88,6 +101,13 @@ def test_it_stays_turned_down_through_a_hold_and_is_tried_anew_from_idle() -> No
     rig.rest(RequestMode(ModeEvent.ENABLE, 10, "bench"), 0.1)
     assert rig.loop.mode == Mode.ACTIVE
     assert time_constant_s(rig) < 0.2 * slow_s
+
+
+def test_much_dead_time_and_a_slow_camera_that_are_told_swing_nothing() -> None:
+    found = random_arms.run(random_arms.draw(127))
+    assert max(found.swings_m) == 0.0
+    assert not found.turned_down
+    assert not found.fault
 
 
 def steps(rig: CameraRig) -> None:
