@@ -6,6 +6,7 @@ machine makes such a daemon late all the same, the test is done again: tools.rig
 """
 
 import os
+import signal
 import subprocess
 from collections.abc import Iterator
 from types import ModuleType
@@ -18,7 +19,12 @@ _REAL = ("tools.rig.daemon", "tools.rig.wire", "tools.rig.emulators", "tools.fau
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let tests be done again in which the machine made an arm hold."""
+    """Let tests be done again in which the machine made an arm hold; give Ctrl-C its meaning back.
+
+    A shell's background job ignores it, and so would every program that a test starts.
+    """
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(DoneAgain())
 
 

@@ -1,12 +1,12 @@
 """Whether a measured tip swings around where it is to be, and does not cease to.
 
 A correction whose model is wrong, by dead time above all, feeds a swing that does not die out. It
-is told from one that does by its turns: so many in a row along an axis, each way between them
-larger than what counts as standing and what the camera's noise explains, all of about one size, and
-one period as long as the next.
+is told from one that does by its turns: so many in a row along an axis, over seconds, each way
+between them larger than what counts as standing and what the camera's noise explains, all of about
+one size, and one period as long as the next.
 Where the tip is to move, its valves and chambers turn with the reference, and its error with them:
-a swing has all of its turns while the reference's acceleration changes its sign once along its
-three axes at most. On a circle it is seen if it is four times as quick.
+a swing turns more than twice as often as the reference's acceleration changes its sign along its
+three axes. On a circle it is seen if it is four times as quick.
 """
 
 import math
@@ -23,12 +23,16 @@ from pneuarm.controllers.geometry.moving_point import MovingPoint
 #: next: one above 0.03 dies out sooner.
 _WAYS, _ALIKE_SHARE = 5, 0.7
 
+#: Nor is it one before it has lasted so long (s): a move excites the mode until it ends. So many
+#: ways are remembered.
+_LASTS_S, _REMEMBERED = 2.0, 64
+
 #: A way that is longer than so many standard deviations of the camera's noise is none of it. They
 #: are found over about so many poses.
 _NOISE_TIMES, _NOISE_POSES = 8.0, 20
 
 #: Fourth differences of poses: a motion leaves little in them, noise of one variance 70 times it. A
-#: swing is seen where the camera takes six poses a period.
+#: swing is seen where the camera takes eight poses a period.
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 
 
@@ -38,8 +42,8 @@ class _Axis:
     def __init__(self, position_m: float) -> None:
         self._turn_m = self._far_m = position_m
         self._sign = 0.0
-        self.ways_m: deque[float] = deque(maxlen=_WAYS)
-        self.turned_s: deque[float] = deque(maxlen=_WAYS)
+        self.ways_m: deque[float] = deque(maxlen=_REMEMBERED)
+        self._turned_s: deque[float] = deque(maxlen=_REMEMBERED)
 
     def look(self, position_m: float, at_s: float, least_m: float) -> bool:
         """Take a position; return whether it has just turned, once more, in a lasting swing."""
@@ -51,14 +55,24 @@ class _Axis:
         if abs(position_m - self._far_m) <= least_m:
             return False
         self.ways_m.append(abs(self._far_m - self._turn_m))
-        self.turned_s.append(at_s)
+        self._turned_s.append(at_s)
         self._turn_m, self._far_m, self._sign = self._far_m, position_m, -self._sign
-        return len(self.ways_m) == _WAYS and _alike(self.ways_m) and _alike(self.periods_s)
+        newest = len(self.turned_s)
+        return newest > 0 and _alike(list(self.ways_m)[-newest:]) and _alike(self.periods_s)
+
+    @property
+    def turned_s(self) -> list[float]:
+        """When it has turned, the newest times that last long enough; none where none do."""
+        turned_s = list(self._turned_s)
+        for number in range(_WAYS, len(turned_s) + 1):
+            if turned_s[-1] - turned_s[-number] >= _LASTS_S:
+                return turned_s[-number:]
+        return []
 
     @property
     def periods_s(self) -> list[float]:
         """From each turn to the one after the next."""
-        turned_s = list(self.turned_s)
+        turned_s = self.turned_s
         return [after - before for before, after in zip(turned_s, turned_s[2:], strict=False)]
 
 
@@ -83,8 +97,8 @@ class SwingWatch:
         self._newest_m: deque[Array] = deque(maxlen=len(_DIFFERENCE))
         self._variance_m2 = np.zeros(3)
         self._signs = [0.0, 0.0, 0.0]
-        #: When the wanted acceleration has changed its sign, the last two times.
-        self._changed_s: deque[float] = deque(maxlen=2)
+        #: When the wanted acceleration has changed its sign.
+        self._changed_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._at_s, self._poses = 0.0, 0
 
     def look(self, position_m: Array, wanted: MovingPoint, pause_s: float) -> bool:
@@ -102,7 +116,9 @@ class SwingWatch:
         if not swings:
             return False
         swing = swings[0]
-        if len(self._changed_s) == 2 and self._changed_s[0] > swing.turned_s[0]:
+        turned_s = swing.turned_s
+        changes = sum(changed_s > turned_s[0] for changed_s in self._changed_s)
+        if 2 * changes >= len(turned_s) - 1:
             return False
         self.way_m = max(axis.ways_m[-1] for axis in self._axes if axis.ways_m)
         self.period_s = sum(swing.periods_s) / len(swing.periods_s)

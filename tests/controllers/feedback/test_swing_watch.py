@@ -47,13 +47,14 @@ def swing(
 @given(
     st.floats(2e-3, 0.05),
     st.floats(0.05, 2.0),
-    st.floats(6.0, 100.0),
+    st.floats(8.0, 100.0),
 )
 def test_a_lasting_swing_is_found_with_its_size_and_period(
     amplitude_m: float, hz: float, poses_a_period: float
 ) -> None:
     camera_hz = hz * poses_a_period
-    watch, at_s = found(swing(amplitude_m, hz, camera_hz, 4.7 / hz), camera_hz)
+    seconds = max(4.7 / hz, 2.0 + 1.5 / hz)
+    watch, at_s = found(swing(amplitude_m, hz, camera_hz, seconds), camera_hz)
     assert len(at_s) == 1
     assert watch.way_m == pytest.approx(2.0 * 0.8 * amplitude_m, rel=0.2, abs=5e-4)
     assert watch.period_s == pytest.approx(1.0 / hz, rel=0.2)
@@ -75,6 +76,14 @@ def test_a_mode_that_dies_out_is_no_swing(
     assert found(tips, 100.0)[1] == []
 
 
+def test_a_mode_that_a_move_excites_is_no_swing_before_it_had_time_to_die_out() -> None:
+    """Four periods of one size while the reference moves, and then it dies out."""
+    tips = swing(5e-3, 2.0, 100.0, 5.0, 0.0)
+    at_s = np.arange(len(tips)) * 0.01
+    tips *= np.exp(-0.1 * 2.0 * np.pi * 2.0 * np.maximum(at_s - 1.2, 0.0))[:, None]
+    assert found(tips, 100.0)[1] == []
+
+
 def test_a_tip_that_comes_and_overshoots_is_no_swing() -> None:
     at_s = np.arange(1000) * 0.01
     way = 1.0 - np.exp(-at_s) * np.cos(3.0 * at_s)
@@ -83,9 +92,10 @@ def test_a_tip_that_comes_and_overshoots_is_no_swing() -> None:
 
 @given(st.floats(0.05, 0.5), st.floats(5.0, 20.0))
 def test_a_swing_on_a_slow_circle_is_found(hz: float, quicker: float) -> None:
-    at_s = np.arange(round(3.0 / hz * 100.0)) * 0.01
+    seconds = 3.0 / hz + 3.0
+    at_s = np.arange(round(seconds * 100.0)) * 0.01
     way = np.array([circle(hz)(time_s).position for time_s in at_s.tolist()])
-    tips = way + swing(0.01, quicker * hz, 100.0, 3.0 / hz)[: len(way)]
+    tips = way + swing(0.01, quicker * hz, 100.0, seconds)[: len(way)]
     assert found(tips, 100.0, circle(hz))[1]
 
 
