@@ -94,7 +94,8 @@ def draw_figures(
             phases[name] = _persist(client, draw)
     if "out of reach" in seconds:
         _progress(f"{label}: out of reach", 0.5)
-        _persist(client, partial(client.move_to, (1.5 * height, 0.0, 0.5 * height)))
+        far = (1.5 * height, 0.0, 0.5 * height)
+        _persist(client, partial(client.move_to, far, strict=False))
     _progress(f"{label}: home", 0.9)
     _persist(client, partial(client.move_to, (0.0, 0.0, height)))
     return phases

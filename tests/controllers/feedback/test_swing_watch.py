@@ -53,7 +53,7 @@ def test_a_lasting_swing_is_found_with_its_size_and_period(
     amplitude_m: float, hz: float, poses_a_period: float
 ) -> None:
     camera_hz = hz * poses_a_period
-    seconds = max(4.7 / hz, 2.0 + 1.5 / hz)
+    seconds = max(4.7 / hz, 2.0 + 2.2 / hz)
     watch, at_s = found(swing(amplitude_m, hz, camera_hz, seconds), camera_hz)
     assert len(at_s) == 1
     assert watch.way_m == pytest.approx(2.0 * 0.8 * amplitude_m, rel=0.2, abs=5e-4)
