@@ -1,6 +1,7 @@
 """What the monitors look for by default, at what is just within and just beyond, and what else."""
 
 import math
+import re
 from dataclasses import replace
 from math import inf, nan
 
@@ -13,7 +14,7 @@ from pneuarm.controllers.arm.arm import Arm, Response
 from pneuarm.hardware.interface import Measurement
 from pneuarm.hardware.tables.table import Table
 from pneuarm.service.configuration.tables.monitors import MonitorsConfig
-from pneuarm.service.modes.mode import Mode
+from pneuarm.service.modes.mode import Mode, ModeEvent
 from pneuarm.service.monitors.device import DeviceComplains, StopPressed
 from pneuarm.service.monitors.estimate_diverges import EstimateDiverges
 from pneuarm.service.monitors.fault import Policy
@@ -473,3 +474,22 @@ def test_a_tip_counts_for_a_fifth_of_a_second_whenever_it_came() -> None:
 def test_the_device_is_looked_at_as_it_is() -> None:
     assert made(StopPressed).look(replace(WELL, stop_pressed=True, age_s=5.0))
     assert made(DeviceComplains).look(replace(WELL, complaints=("hot",), age_s=5.0)) == "hot"
+
+
+def test_an_impossible_estimate_is_told_with_its_chamber_in_millimetres() -> None:
+    lengths_m = [*MODEL_M]
+    lengths_m[1] = 0.412
+    monitor, what = made(EstimateDiverges, margin_mm=10.0), ""
+    for number in range(1, round(10.0 / DT_S)):
+        what = what or monitor.look(replace(WELL, estimated_m=lengths_m, now_s=number * DT_S))
+    assert "chamber 2" in what
+    numbers = [int(number) for number in re.findall(r"-?\d+", what)]
+    assert 412 in numbers
+    assert min(numbers) > 0
+    assert {90, 310} <= set(numbers)  # Eq. (4)'s interval with the margin
+
+
+def test_the_policies_bring_about_what_they_say() -> None:
+    events = [None, ModeEvent.FAULT_HOLD, ModeEvent.FAULT, ModeEvent.FAULT, ModeEvent.ESTOP]
+    assert [policy.event for policy in sorted(Policy)] == events
+    assert len({policy.consequence for policy in Policy}) == len(events)
