@@ -45,35 +45,34 @@ class _Axis:
         self.ways_m: deque[float] = deque(maxlen=_REMEMBERED)
         self._turned_s: deque[float] = deque(maxlen=_REMEMBERED)
 
-    def look(self, position_m: float, at_s: float, least_m: float) -> bool:
-        """Take a position; return whether it has just turned, once more, in a lasting swing."""
+    def look(self, position_m: float, at_s: float, least_m: float) -> list[float]:
+        """Take a position; return the times of the turns of a lasting swing that turns now."""
         if self._sign == 0.0 and abs(position_m - self._turn_m) > least_m:
             self._sign = 1.0 if position_m > self._turn_m else -1.0
         if self._sign * (position_m - self._far_m) >= 0.0:
             self._far_m = position_m
-            return False
+            return []
         if abs(position_m - self._far_m) <= least_m:
-            return False
+            return []
         self.ways_m.append(abs(self._far_m - self._turn_m))
         self._turned_s.append(at_s)
         self._turn_m, self._far_m, self._sign = self._far_m, position_m, -self._sign
-        newest = len(self.turned_s)
-        return newest > 0 and _alike(list(self.ways_m)[-newest:]) and _alike(self.periods_s)
+        turned_s = _lasting(list(self._turned_s))
+        ways_m = list(self.ways_m)[-len(turned_s) :]
+        return turned_s if turned_s and _alike(ways_m) and _alike(_periods_s(turned_s)) else []
 
-    @property
-    def turned_s(self) -> list[float]:
-        """When it has turned, the newest times that last long enough; none where none do."""
-        turned_s = list(self._turned_s)
-        for number in range(_WAYS, len(turned_s) + 1):
-            if turned_s[-1] - turned_s[-number] >= _LASTS_S:
-                return turned_s[-number:]
-        return []
 
-    @property
-    def periods_s(self) -> list[float]:
-        """From each turn to the one after the next."""
-        turned_s = self.turned_s
-        return [after - before for before, after in zip(turned_s, turned_s[2:], strict=False)]
+def _lasting(turned_s: list[float]) -> list[float]:
+    """The newest of the turns that are so many and last so long; none where none do."""
+    for number in range(_WAYS, len(turned_s) + 1):
+        if turned_s[-1] - turned_s[-number] >= _LASTS_S:
+            return turned_s[-number:]
+    return []
+
+
+def _periods_s(turned_s: list[float]) -> list[float]:
+    """From each turn to the one after the next."""
+    return [after - before for before, after in zip(turned_s, turned_s[2:], strict=False)]
 
 
 def _alike(values: Collection[float]) -> bool:
@@ -112,16 +111,16 @@ class SwingWatch:
         self._axes = self._axes or [_Axis(value_m) for value_m in off_m.tolist()]
         least_m = max(self._least_m, _NOISE_TIMES * self._noise_m(off_m))
         tip = zip(self._axes, off_m.tolist(), strict=True)
-        swings = [axis for axis, value_m in tip if axis.look(value_m, self._at_s, least_m)]
-        if not swings:
+        swings = [axis.look(value_m, self._at_s, least_m) for axis, value_m in tip]
+        turned_s = next(filter(None, swings), None)
+        if turned_s is None:
             return False
-        swing = swings[0]
-        turned_s = swing.turned_s
         changes = sum(changed_s > turned_s[0] for changed_s in self._changed_s)
         if 2 * changes >= len(turned_s) - 1:
             return False
         self.way_m = max(axis.ways_m[-1] for axis in self._axes if axis.ways_m)
-        self.period_s = sum(swing.periods_s) / len(swing.periods_s)
+        periods_s = _periods_s(turned_s)
+        self.period_s = sum(periods_s) / len(periods_s)
         self.begin_anew()
         return True
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
 from pneuarm.logs.schema.printable import name_of
+from pneuarm.service.client.moving import out_of_reach
 
 
 def millimetres(values_m: Iterable[float]) -> str:
@@ -15,13 +16,6 @@ def millimetres(values_m: Iterable[float]) -> str:
 def bars(values_pa: Iterable[float]) -> str:
     """Format pascal as bar."""
     return "(" + ", ".join(f"{1e-5 * value:+.3f}" for value in values_pa) + ")"
-
-
-def binding(flags: int) -> str:
-    """Name the limits that bind."""
-    from pneuarm.controllers.limits.limits import words  # CasADi with it: only where it is needed
-
-    return words(flags) or "no limit"
 
 
 def state_line(state: pb.ArmState) -> str:
@@ -49,10 +43,7 @@ def outcome(state: pb.ArmState) -> str:
     error = 1e3 * state.target_error_m
     if state.reach == pb.REACHED:
         return f"reached: tip at {tip} mm (estimated), commanded error {error:.2f} mm"
-    return (
-        f"out of reach: {binding(state.binding_limits)} binds; the nearest the arm came is "
-        f"{millimetres(state.tip_commanded_position_m)} mm, {error:.1f} mm away"
-    )
+    return str(out_of_reach(state))
 
 
 def radians(values_deg: list[float] | None) -> list[float] | None:

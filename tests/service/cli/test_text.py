@@ -3,7 +3,7 @@
 import pytest
 
 from pneuarm.logs.schema import pneuarm_pb2 as pb
-from pneuarm.service.cli.text import bars, binding, millimetres, outcome, radians, state_line
+from pneuarm.service.cli.text import bars, millimetres, outcome, radians, state_line
 
 STATE = pb.ArmState(
     sequence=12,
@@ -41,7 +41,10 @@ def test_units() -> None:
 )
 def test_the_limits_that_bind_are_named_and_no_others(flags: int, told: list[str]) -> None:
     every = ["length", "Eq. (4)", "bend", "pressure", "keep-out"]
-    assert [word for word in every if word in binding(flags)] == told
+    away = pb.ArmState()
+    away.CopyFrom(STATE)
+    away.binding_limits = flags
+    assert [word for word in every if word in outcome(away)] == told
 
 
 def test_a_state_is_one_line() -> None:
@@ -69,7 +72,7 @@ def test_how_a_target_ended() -> None:
     )
     away = outcome(STATE)
     assert away.startswith("out of reach")
-    assert binding(STATE.binding_limits) in away
+    assert "length, Eq. (4) and pressure binds" in away
     assert "(51.0, 0.0, 200.0) mm" in away
     assert "12.3 mm" in away
 
