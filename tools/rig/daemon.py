@@ -4,6 +4,7 @@ Every daemon has its own arm's name, device, ports and log directory, so that th
 other daemons, and beside each other.
 """
 
+import contextlib
 import itertools
 import math
 import os
@@ -12,7 +13,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -207,6 +208,15 @@ class Daemon:
         """Send a signal to one of the processes that :meth:`pids` has named: it is broken by it."""
         self.breaks(self._names[pid])
         os.kill(pid, number)
+
+    @contextlib.contextmanager
+    def standing_still(self, pid: int) -> Iterator[None]:
+        """Let one of the processes that :meth:`pids` has named stand still meanwhile."""
+        self.send_signal_to(pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self.send_signal_to(pid, signal.SIGCONT)
 
     def send_signal_to_all(self, number: int) -> None:
         """Send a signal to the whole group, as a terminal does."""

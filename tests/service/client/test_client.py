@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import signal
 import time
 from collections.abc import Iterator
 from itertools import islice
@@ -196,12 +195,11 @@ def test_a_reset_stays_whatever_stop_came_before_it(client: Client) -> None:
 
 def test_stop_that_nothing_shows_is_not_confirmed(client: Client, daemon: Daemon) -> None:
     gateway = daemon.pids("gateway")["gateway"]
-    daemon.send_signal_to(gateway, signal.SIGSTOP)
-    try:
-        with pytest.raises(NotConfirmed, match=r"NOT CONFIRMED: .* cut the air supply"):
-            client.estop()
-    finally:
-        daemon.send_signal_to(gateway, signal.SIGCONT)
+    with (
+        daemon.standing_still(gateway),
+        pytest.raises(NotConfirmed, match=r"NOT CONFIRMED: .* cut the air supply"),
+    ):
+        client.estop()
     wait_for(lambda: client.state().mode == pb.ESTOP, "the belated stop")
     wait_for(lambda: is_ready(client), "an arm that is reset")
 

@@ -50,11 +50,8 @@ def test_gateway_stopped_arm_holds_then_vents(daemon: Daemon) -> None:
         arm(client)
         keep_moving(client, enough(0.5), "some movement")
         known = len(daemon.codes())
-        daemon.send_signal_to(gateway, signal.SIGSTOP)
-        try:
+        with daemon.standing_still(gateway):
             wait_for(lambda: "gateway_lost" in daemon.codes()[known:], "the arm to vent")
-        finally:
-            daemon.send_signal_to(gateway, signal.SIGCONT)
         arm(client)
     new = daemon.codes()[known:]
     assert new[:2] == ["gateway_silent", "gateway_lost"]
@@ -65,11 +62,8 @@ def test_local_stop_works_while_the_gateway_stands_still(daemon: Daemon) -> None
     gateway = daemon.pids("gateway")["gateway"]
     with daemon.client() as client:
         arm(client)
-        daemon.send_signal_to(gateway, signal.SIGSTOP)
-        try:
+        with daemon.standing_still(gateway):
             done = daemon.command("estop", "--json")
-        finally:
-            daemon.send_signal_to(gateway, signal.SIGCONT)
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout) == {"stopped": True, "confirmed": "on this machine"}
         wait_for(lambda: client.state().mode == pb.ESTOP, "the stop in the state")

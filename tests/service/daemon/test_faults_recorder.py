@@ -49,13 +49,10 @@ def lost(client: Client) -> int:
 
 def test_recorder_stopped_for_a_while_loses_nothing(daemon: Daemon, client: Client) -> None:
     recorder = daemon.pids("recorder")["recorder"]
-    daemon.send_signal_to(recorder, signal.SIGSTOP)
-    try:
+    with daemon.standing_still(recorder):
         keep_moving(client, enough(3.0), "three seconds of movement without a recorder")
         stopped_at = summarise(daemon.log()).ticks
         assert client.state().sequence - stopped_at > 2000
-    finally:
-        daemon.send_signal_to(recorder, signal.SIGCONT)
     keep_moving(client, lambda: summarise(daemon.log()).ticks > stopped_at + 2000, "catching up")
     summary = caught_up(daemon, client)
     assert summary.missing_ticks == 0

@@ -45,6 +45,10 @@ def listens(daemon: Daemon) -> bool:
         return probe.connect_ex(("127.0.0.1", daemon.rerun_port)) == 0
 
 
+def skipped_more(client: Client, before: int) -> Callable[[], bool]:
+    return lambda: viewer(client).dropped > before
+
+
 def test_viewer_serves(daemon: Daemon, client: Client) -> None:
     daemon.pids("viewer", "rerun")
     keep_moving(client, lambda: listens(daemon), "Rerun's server")
@@ -57,18 +61,11 @@ def test_viewer_stopped_changes_nothing_and_its_skips_are_counted(
 ) -> None:
     known = daemon.pids("viewer")["viewer"]
     before = viewer(client).dropped
-    daemon.send_signal_to(known, signal.SIGSTOP)
-    try:
+    with daemon.standing_still(known):
         keep_moving(client, enough(4.5), "movement while the viewer stands still")
-    finally:
-        daemon.send_signal_to(known, signal.SIGCONT)
-    keep_moving(client, lambda: viewer(client).dropped > before + 500, "the skips in health")
+    keep_moving(client, skipped_more(client, before + 500), "the skips in health")
     assert viewer(client).pid == known
     assert viewer(client).restarts == 0
-
-
-def skipped_more(client: Client, before: int) -> Callable[[], bool]:
-    return lambda: viewer(client).dropped > before
 
 
 def test_viewer_that_stands_still_again_and_again_keeps_no_old_connection(
@@ -77,11 +74,8 @@ def test_viewer_that_stands_still_again_and_again_keeps_no_old_connection(
     known, threads = daemon.pids("viewer")["viewer"], []
     for _ in range(3):
         before = viewer(client).dropped
-        daemon.send_signal_to(known, signal.SIGSTOP)
-        try:
+        with daemon.standing_still(known):
             keep_moving(client, enough(5.5), "a stall after which the viewer connects anew")
-        finally:
-            daemon.send_signal_to(known, signal.SIGCONT)
         keep_moving(client, skipped_more(client, before), "movement that is viewed again")
         threads.append(len(list(Path(f"/proc/{known}/task").iterdir())))
     assert threads[2] <= threads[1]

@@ -10,7 +10,7 @@ from pneuarm.controllers.arm.arm import Array
 from pneuarm.hardware.interface import Measurement
 from pneuarm.service.devices import process as module
 from pneuarm.service.devices.process import DeviceProcess
-from pneuarm.service.processes.device_slots import DeviceWatch, LinkState
+from pneuarm.service.processes.device_slots import LinkState
 from tests.service.devices.test_process import SOME_PA, Clock, Rig
 
 
@@ -259,16 +259,6 @@ def test_it_tells_that_it_connects_while_it_does(rig: Rig, monkeypatch: pytest.M
     rig.clock.sleep(1.0)
     rig.process.step()
     assert states == [LinkState.STARTING] * 2
-
-
-def test_silence_that_could_not_vent_tells_both(rig: Rig) -> None:
-    rig.active()
-    rig.device.fails = {"vent"}
-    rig.clock.sleep(1.0)
-    rig.process.step()
-    standing = DeviceWatch(rig.link).standing()
-    assert standing is not None
-    assert all(fact in standing.text for fact in ("50 ms", "vent failed"))
 
 
 def test_a_device_that_was_lost_gets_no_zeros_at_the_end(rig: Rig) -> None:
